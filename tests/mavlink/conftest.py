@@ -1,6 +1,7 @@
 """Every test of the link runs on our event loop and on asyncio's own."""
 
 import asyncio
+import inspect
 
 import pytest
 
@@ -11,3 +12,19 @@ from companion.mavlink import loop as link_loop
 def run(request):
     """Runs a coroutine on our event loop, and again on asyncio's own."""
     return link_loop.run if request.param == "link loop" else asyncio.run
+
+
+def pytest_pycollect_makeitem(name, obj):
+    """A test that is a coroutine uses `run`."""
+    if name.startswith("test_") and inspect.iscoroutinefunction(obj):
+        pytest.mark.usefixtures("run")(obj)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem):
+    """Calls a test that is a coroutine by `run`."""
+    test, values = pyfuncitem.obj, pyfuncitem.funcargs
+    if not inspect.iscoroutinefunction(test):
+        return None
+    values["run"](test(**{name: values[name] for name in inspect.signature(test).parameters}))
+    return True

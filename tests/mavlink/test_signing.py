@@ -98,50 +98,41 @@ def test_keys(tmp_path):
         Signing(b"short")
 
 
-def test_a_signed_link_end_to_end(run):
-    async def scene():
-        settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=signing())
-        async with Link(settings) as link:
-            vehicle = await FakeVehicle(link.local_address).open_udp()
-            vehicle.mav = signer()
-            checked = signer()
-            vehicle._parser.signing = checked.signing
-            vehicle.send(heartbeat())
-            await link.wait_connected(5.0)
-            link.on_attitude = lambda sample: link.send_setpoint(
-                sample.time_boot_ms, BodyRates(0.1, 0.2, 0.3), 0.5
-            )
-            vehicle.send(attitude(4))
-            [setpoint] = await vehicle.hears("SET_ATTITUDE_TARGET")
-            assert setpoint.get_signed()
-            assert (setpoint.time_boot_ms, setpoint.thrust) == (4, 0.5)
-            vehicle.close()
-
-    run(scene())
+async def test_a_signed_link_end_to_end():
+    settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=signing())
+    async with Link(settings) as link:
+        vehicle = await FakeVehicle(link.local_address).open_udp()
+        vehicle.mav = signer()
+        checked = signer()
+        vehicle._parser.signing = checked.signing
+        vehicle.send(heartbeat())
+        await link.wait_connected(5.0)
+        link.on_attitude = lambda sample: link.send_setpoint(
+            sample.time_boot_ms, BodyRates(0.1, 0.2, 0.3), 0.5
+        )
+        vehicle.send(attitude(4))
+        [setpoint] = await vehicle.hears("SET_ATTITUDE_TARGET")
+        assert setpoint.get_signed()
+        assert (setpoint.time_boot_ms, setpoint.thrust) == (4, 0.5)
+        vehicle.close()
 
 
-def test_an_unsigned_vehicle_is_refused_and_that_is_said_once(run, caplog):
-    async def scene():
-        settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=signing())
-        async with Link(settings) as link:
-            vehicle = await FakeVehicle(link.local_address).open_udp()
-            vehicle.send(heartbeat(), heartbeat(), heartbeat())
-            with pytest.raises(LinkTimeout, match="3 frames that are not signed with the key"):
-                await link.wait_connected(0.1)
-            vehicle.close()
-
-    run(scene())
+async def test_an_unsigned_vehicle_is_refused_and_that_is_said_once(caplog):
+    settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=signing())
+    async with Link(settings) as link:
+        vehicle = await FakeVehicle(link.local_address).open_udp()
+        vehicle.send(heartbeat(), heartbeat(), heartbeat())
+        with pytest.raises(LinkTimeout, match="3 frames that are not signed with the key"):
+            await link.wait_connected(0.1)
+        vehicle.close()
     assert caplog.text.count("same key") == 1
 
 
-def test_without_a_key_signed_frames_are_heard_too(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            vehicle.mav = signer()
-            heard = asyncio.Event()
-            link.on_attitude = lambda sample: heard.set()
-            vehicle.send(attitude(4))
-            async with asyncio.timeout(5.0):
-                await heard.wait()
-
-    run(scene())
+async def test_without_a_key_signed_frames_are_heard_too():
+    async with linked() as (link, vehicle):
+        vehicle.mav = signer()
+        heard = asyncio.Event()
+        link.on_attitude = lambda sample: heard.set()
+        vehicle.send(attitude(4))
+        async with asyncio.timeout(5.0):
+            await heard.wait()

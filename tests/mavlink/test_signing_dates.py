@@ -244,26 +244,23 @@ def test_a_damaged_file_is_told_and_replaced(text):
     assert file.load()[1] is None
 
 
-def test_a_disk_that_cannot_be_written_is_one_notice_and_no_failure(state, run):
+async def test_a_disk_that_cannot_be_written_is_one_notice_and_no_failure(state):
     (state / "mavlink-companion").write_text("a file where a directory should be")
 
-    async def scene():
-        notices = []
-        file = StampFile(KEY)
-        ours = Signing(KEY, file=file)
-        settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=ours)
-        async with Link(settings, notice=notices.append) as link:
-            vehicle = await FakeVehicle(link.local_address).open_udp()
-            vehicle.mav.signing.secret_key = KEY
-            vehicle.mav.signing.timestamp = ticks(time.time())
-            vehicle.mav.signing.sign_outgoing = True
-            vehicle.send(heartbeat())
-            await link.wait_connected(5.0)
-            vehicle.close()
-        assert len(notices) == 1 or "cannot be read" in notices[0]
-        assert sum("cannot be written to" in notice for notice in notices) == 1
-
-    run(scene())
+    notices = []
+    file = StampFile(KEY)
+    ours = Signing(KEY, file=file)
+    settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=ours)
+    async with Link(settings, notice=notices.append) as link:
+        vehicle = await FakeVehicle(link.local_address).open_udp()
+        vehicle.mav.signing.secret_key = KEY
+        vehicle.mav.signing.timestamp = ticks(time.time())
+        vehicle.mav.signing.sign_outgoing = True
+        vehicle.send(heartbeat())
+        await link.wait_connected(5.0)
+        vehicle.close()
+    assert len(notices) == 1 or "cannot be read" in notices[0]
+    assert sum("cannot be written to" in notice for notice in notices) == 1
     _, ours = run_once(NOW, frame(NOW))  # written twice at least, told once
     assert sum("cannot be written to" in remark for remark in ours.remarks) == 1
 
@@ -278,33 +275,30 @@ def test_the_directory_may_be_named_only_absolutely(monkeypatch, tmp_path):
 # --- over a link
 
 
-def test_a_link_whose_clock_is_months_back_takes_the_vehicles_date_by_its_answer(run):
+async def test_a_link_whose_clock_is_months_back_takes_the_vehicles_date_by_its_answer():
     """The vehicle as pymavlink judges: it refuses new streams older than a minute."""
 
-    async def scene():
-        notices = []
-        ours = Signing(KEY, clock=lambda: time.time() - 60 * DAY)
-        settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=ours)
-        async with Link(settings, notice=notices.append) as link:
-            vehicle = await FakeVehicle(link.local_address).open_udp()
-            for side in (vehicle.mav, vehicle._parser):
-                side.signing.secret_key, side.signing.link_id = KEY, 2
-                side.signing.timestamp = ticks(time.time())
-            vehicle.mav.signing.sign_outgoing = True
-            vehicle.answers["TIMESYNC"] = lambda asked: (
-                [] if asked.tc1 else [dialect.MAVLink_timesync_message(5_000_000, asked.ts1)]
-            )
+    notices = []
+    ours = Signing(KEY, clock=lambda: time.time() - 60 * DAY)
+    settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=ours)
+    async with Link(settings, notice=notices.append) as link:
+        vehicle = await FakeVehicle(link.local_address).open_udp()
+        for side in (vehicle.mav, vehicle._parser):
+            side.signing.secret_key, side.signing.link_id = KEY, 2
+            side.signing.timestamp = ticks(time.time())
+        vehicle.mav.signing.sign_outgoing = True
+        vehicle.answers["TIMESYNC"] = lambda asked: (
+            [] if asked.tc1 else [dialect.MAVLink_timesync_message(5_000_000, asked.ts1)]
+        )
 
-            def connected():
-                vehicle.send(heartbeat())
-                return link.state.heartbeat
+        def connected():
+            vehicle.send(heartbeat())
+            return link.state.heartbeat
 
-            await until(connected)
-            assert link.stats.peers == 0
-            assert any("60 days behind the vehicle" in notice for notice in notices)
-            vehicle.close()
-
-    run(scene())
+        await until(connected)
+        assert link.stats.peers == 0
+        assert any("60 days behind the vehicle" in notice for notice in notices)
+        vehicle.close()
 
 
 def wait_for(condition):
@@ -314,18 +308,15 @@ def wait_for(condition):
         time.sleep(0.001)
 
 
-def test_the_loop_never_waits_for_the_disk(run, monkeypatch):
+async def test_the_loop_never_waits_for_the_disk(monkeypatch):
     """A disk that hangs: the link opens, hears, and closes after the 2 s it is given."""
     monkeypatch.setattr("companion.mavlink.signing._LAST_WRITE_TIMEOUT_S", 0.05)
     answers = threading.Event()
     monkeypatch.setattr(StampFile, "save", lambda *_: answers.wait(10.0))
 
-    async def scene():
-        began = time.monotonic()
-        settings = LinkSettings("udpin://127.0.0.1:0", signing=Signing(KEY, file=StampFile(KEY)))
-        async with Link(settings):
-            await asyncio.sleep(0)
-        assert time.monotonic() - began < 5.0
-        answers.set()
-
-    run(scene())
+    began = time.monotonic()
+    settings = LinkSettings("udpin://127.0.0.1:0", signing=Signing(KEY, file=StampFile(KEY)))
+    async with Link(settings):
+        await asyncio.sleep(0)
+    assert time.monotonic() - began < 5.0
+    answers.set()

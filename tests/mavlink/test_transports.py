@@ -65,219 +65,186 @@ def tcp(vehicle):
     return LinkSettings(endpoint=f"tcp://127.0.0.1:{vehicle.address[1]}")
 
 
-def test_tcp_client_reads_frames_cut_anywhere(run):
-    async def scene():
-        vehicle = await TcpVehicle().listen()
-        async with Link(tcp(vehicle)) as link:
-            await link.wait_connected(5.0)
-            stamps = []
-            link.on_attitude = lambda sample: stamps.append(sample.time_boot_ms)
-            [first, second] = frames_of(attitude(4), attitude(8), start=vehicle.mav.seq)
-            stream = b"noise" + first + b"\xfd\x00" + second
-            for index in range(0, len(stream), 7):
-                vehicle.send_raw(stream[index : index + 7])
-                await asyncio.sleep(0)
-            await until(lambda: len(stamps) == 2)
-            assert stamps == [4, 8]
-            link.send_setpoint(8, LEVEL, 0.5)
-            assert (await vehicle.hears("SET_ATTITUDE_TARGET"))[0].time_boot_ms == 8
-        vehicle.server.close()
-
-    run(scene())
+async def test_tcp_client_reads_frames_cut_anywhere():
+    vehicle = await TcpVehicle().listen()
+    async with Link(tcp(vehicle)) as link:
+        await link.wait_connected(5.0)
+        stamps = []
+        link.on_attitude = lambda sample: stamps.append(sample.time_boot_ms)
+        [first, second] = frames_of(attitude(4), attitude(8), start=vehicle.mav.seq)
+        stream = b"noise" + first + b"\xfd\x00" + second
+        for index in range(0, len(stream), 7):
+            vehicle.send_raw(stream[index : index + 7])
+            await asyncio.sleep(0)
+        await until(lambda: len(stamps) == 2)
+        assert stamps == [4, 8]
+        link.send_setpoint(8, LEVEL, 0.5)
+        assert (await vehicle.hears("SET_ATTITUDE_TARGET"))[0].time_boot_ms == 8
+    vehicle.server.close()
 
 
-def test_after_a_drop_nothing_old_is_sent_and_commands_are_told(run):
-    async def scene():
-        vehicle = await TcpVehicle().listen()
-        async with Link(tcp(vehicle)) as link:
-            await link.wait_connected(5.0)
-            waiting = asyncio.create_task(link.command(400, 1.0, timeout_s=30.0))
-            await vehicle.hears("COMMAND_LONG")
-            port = vehicle.address[1]
-            vehicle.server.close()
-            vehicle.drop()
-            with pytest.raises(LinkLost, match="dropped"):
-                await waiting
-            for stamp in range(50):  # into the void
-                link.send_setpoint(stamp, LEVEL, 0.5)
-            assert link.stats.not_sent >= 50
-            again = await TcpVehicle().listen(port)
-            await until(lambda: link.stats.reconnects == 1)
-            link.send_setpoint(1000, LEVEL, 0.5)
-            setpoints = await again.hears("SET_ATTITUDE_TARGET")
-            assert [setpoint.time_boot_ms for setpoint in setpoints] == [1000]
-            assert again.of("COMMAND_LONG") == []
-            samples = []
-            link.on_attitude = samples.append
-            again.send(attitude(4))
-            await until(lambda: samples)
-            again.server.close()
-
-    run(scene())
-
-
-def test_a_vehicle_that_does_not_read_gets_no_backlog(run):
-    async def scene():
-        vehicle = TcpVehicle()
-        server = await asyncio.start_server(
-            lambda reader, writer: vehicle.write_with(writer.write), "127.0.0.1", 0, limit=1
-        )
-        vehicle.address = server.sockets[0].getsockname()
-        async with Link(tcp(vehicle)) as link:
-            await asyncio.sleep(0.01)
-            connection = link._outbox.transport._connection
-            connection.pause_reading()
-            for stamp in range(200_000):
-                link.send_setpoint(stamp, LEVEL, 0.5)
-                if link.stats.not_sent:
-                    break
-            assert link.stats.not_sent
-            assert connection.get_write_buffer_size() < 4096
-        server.close()
-
-    run(scene())
-
-
-def test_tcp_server_takes_one_vehicle_and_the_next_after_it(run):
-    async def scene():
-        async with Link(LinkSettings(endpoint="tcpin://127.0.0.1:0")) as link:
-            vehicle = await TcpVehicle().connect(link.local_address)
-            await link.wait_connected(5.0)
-            _, turned_away = await asyncio.open_connection(*link.local_address)
-            vehicle.send(heartbeat(0x00060000))
-            await until(lambda: link.state.mode == "OFFBOARD")
-            vehicle.drop()
-            await until(lambda: link.stats.reconnects == 1)
-            turned_away.close()
-            again = await TcpVehicle().connect(link.local_address)
-            await until(lambda: link.state.mode == "AUTO.LOITER")
-            link.send_setpoint(4, LEVEL, 0.5)
-            await again.hears("SET_ATTITUDE_TARGET")
-            again.drop()
-
-    run(scene())
-
-
-def test_tcp_errors_say_how_to_mend_them(run, monkeypatch):
-    async def scene():
-        vehicle = await TcpVehicle().listen()
+async def test_after_a_drop_nothing_old_is_sent_and_commands_are_told():
+    vehicle = await TcpVehicle().listen()
+    async with Link(tcp(vehicle)) as link:
+        await link.wait_connected(5.0)
+        waiting = asyncio.create_task(link.command(400, 1.0, timeout_s=30.0))
+        await vehicle.hears("COMMAND_LONG")
         port = vehicle.address[1]
-        with pytest.raises(EndpointError, match="port is in use"):
-            async with Link(LinkSettings(endpoint=f"tcpin://127.0.0.1:{port}")):
-                pass
         vehicle.server.close()
-        await vehicle.server.wait_closed()
-        with pytest.raises(EndpointError, match="running and listening"):
-            async with Link(LinkSettings(endpoint=f"tcp://127.0.0.1:{port}")):
-                pass
+        vehicle.drop()
+        with pytest.raises(LinkLost, match="dropped"):
+            await waiting
+        for stamp in range(50):  # into the void
+            link.send_setpoint(stamp, LEVEL, 0.5)
+        assert link.stats.not_sent >= 50
+        again = await TcpVehicle().listen(port)
+        await until(lambda: link.stats.reconnects == 1)
+        link.send_setpoint(1000, LEVEL, 0.5)
+        setpoints = await again.hears("SET_ATTITUDE_TARGET")
+        assert [setpoint.time_boot_ms for setpoint in setpoints] == [1000]
+        assert again.of("COMMAND_LONG") == []
+        samples = []
+        link.on_attitude = samples.append
+        again.send(attitude(4))
+        await until(lambda: samples)
+        again.server.close()
 
-    run(scene())
+
+async def test_a_vehicle_that_does_not_read_gets_no_backlog():
+    vehicle = TcpVehicle()
+    server = await asyncio.start_server(
+        lambda reader, writer: vehicle.write_with(writer.write), "127.0.0.1", 0, limit=1
+    )
+    vehicle.address = server.sockets[0].getsockname()
+    async with Link(tcp(vehicle)) as link:
+        await asyncio.sleep(0.01)
+        connection = link._outbox.transport._connection
+        connection.pause_reading()
+        for stamp in range(200_000):
+            link.send_setpoint(stamp, LEVEL, 0.5)
+            if link.stats.not_sent:
+                break
+        assert link.stats.not_sent
+        assert connection.get_write_buffer_size() < 4096
+    server.close()
+
+
+async def test_tcp_server_takes_one_vehicle_and_the_next_after_it():
+    async with Link(LinkSettings(endpoint="tcpin://127.0.0.1:0")) as link:
+        vehicle = await TcpVehicle().connect(link.local_address)
+        await link.wait_connected(5.0)
+        _, turned_away = await asyncio.open_connection(*link.local_address)
+        vehicle.send(heartbeat(0x00060000))
+        await until(lambda: link.state.mode == "OFFBOARD")
+        vehicle.drop()
+        await until(lambda: link.stats.reconnects == 1)
+        turned_away.close()
+        again = await TcpVehicle().connect(link.local_address)
+        await until(lambda: link.state.mode == "AUTO.LOITER")
+        link.send_setpoint(4, LEVEL, 0.5)
+        await again.hears("SET_ATTITUDE_TARGET")
+        again.drop()
+
+
+async def test_tcp_errors_say_how_to_mend_them(monkeypatch):
+    vehicle = await TcpVehicle().listen()
+    port = vehicle.address[1]
+    with pytest.raises(EndpointError, match="port is in use"):
+        async with Link(LinkSettings(endpoint=f"tcpin://127.0.0.1:{port}")):
+            pass
+    vehicle.server.close()
+    await vehicle.server.wait_closed()
+    with pytest.raises(EndpointError, match="running and listening"):
+        async with Link(LinkSettings(endpoint=f"tcp://127.0.0.1:{port}")):
+            pass
 
 
 @pytest.mark.parametrize("scheme", ["tcp", "udpout"])
-def test_an_unknown_host_is_said(run, scheme):
-    async def scene():
-        with pytest.raises(EndpointError, match=r"host .*unknown"):
-            async with Link(LinkSettings(endpoint=f"{scheme}://no-such-host.invalid:5760")):
-                pass
-
-    run(scene())
-
-
-def test_an_address_that_is_not_ours_is_said(run):
-    async def scene():
-        with pytest.raises(EndpointError, match="no interface"):
-            async with Link(LinkSettings(endpoint="udpin://192.0.2.1:0")):
-                pass
-
-    run(scene())
-
-
-def test_serial_both_ways_and_its_end(run):
-    async def scene():
-        ours, theirs = pty.openpty()
-        tty.setraw(ours)
-        loop = asyncio.get_running_loop()
-        vehicle = FakeVehicle()
-        vehicle.write_with(lambda frame: os.write(ours, frame))
-        loop.add_reader(ours, lambda: vehicle.take(os.read(ours, 4096)))
-        async with Link(LinkSettings(endpoint=f"serial://{os.ttyname(theirs)}:921600")) as link:
-            vehicle.send(heartbeat())
-            await link.wait_connected(5.0)
-            link.on_attitude = lambda sample: link.send_setpoint(sample.time_boot_ms, LEVEL, 0.5)
-            vehicle.send(attitude(4))
-            assert (await vehicle.hears("SET_ATTITUDE_TARGET"))[0].time_boot_ms == 4
-            waiting = asyncio.create_task(link.command(400, timeout_s=30.0))
-            await vehicle.hears("COMMAND_LONG")
-            loop.remove_reader(ours)
-            os.close(theirs)
-            os.close(ours)
-            with pytest.raises(LinkLost):
-                await waiting
-            link.send_setpoint(8, LEVEL, 0.5)  # harmless
-
-    run(scene())
-
-
-def test_a_full_serial_buffer_never_cuts_a_frame(run):
-    async def scene():
-        ours, theirs = pty.openpty()
-        tty.setraw(ours)
-        os.set_blocking(ours, False)
-        parser = dialect.MAVLink(None)
-        async with Link(LinkSettings(endpoint=f"serial://{os.ttyname(theirs)}:921600")) as link:
-            stamps, sent = [], 0
-
-            def drain():
-                try:
-                    for message in parser.parse_buffer(os.read(ours, 65536)) or ():
-                        if message.get_type() == "SET_ATTITUDE_TARGET":
-                            stamps.append(message.time_boot_ms)
-                except BlockingIOError:
-                    pass
-
-            for round_number in range(20):
-                for index in range(500):
-                    before = link.stats.sent
-                    link.send_setpoint(1000 * round_number + index, LEVEL, 0.5)
-                    sent += link.stats.sent - before
-                drain()
-                await asyncio.sleep(0.002)
-            assert link.stats.not_sent > 0
-            while len(stamps) < sent:
-                drain()
-                await asyncio.sleep(0.001)
-            assert stamps == sorted(stamps)  # pymavlink would raise on a frame that was cut
-            assert len(stamps) == sent
-        os.close(theirs)
-        os.close(ours)
-
-    run(scene())
-
-
-def test_a_missing_device_is_said(run):
-    async def scene():
-        with pytest.raises(EndpointError, match="no such device"):
-            async with Link(LinkSettings(endpoint="serial:///dev/ttyNOSUCH:57600")):
-                pass
-
-    run(scene())
-
-
-def test_a_device_in_use_by_another_program_is_said(run):
-    async def scene():
-        ours, theirs = pty.openpty()
-        endpoint = f"serial://{os.ttyname(theirs)}:57600"
-        async with Link(LinkSettings(endpoint=endpoint)):
-            with pytest.raises(EndpointError, match="in use by another program"):
-                async with Link(LinkSettings(endpoint=endpoint)):
-                    pass
-        async with Link(LinkSettings(endpoint=endpoint)):  # free again
+async def test_an_unknown_host_is_said(scheme):
+    with pytest.raises(EndpointError, match=r"host .*unknown"):
+        async with Link(LinkSettings(endpoint=f"{scheme}://no-such-host.invalid:5760")):
             pass
+
+
+async def test_an_address_that_is_not_ours_is_said():
+    with pytest.raises(EndpointError, match="no interface"):
+        async with Link(LinkSettings(endpoint="udpin://192.0.2.1:0")):
+            pass
+
+
+async def test_serial_both_ways_and_its_end():
+    ours, theirs = pty.openpty()
+    tty.setraw(ours)
+    loop = asyncio.get_running_loop()
+    vehicle = FakeVehicle()
+    vehicle.write_with(lambda frame: os.write(ours, frame))
+    loop.add_reader(ours, lambda: vehicle.take(os.read(ours, 4096)))
+    async with Link(LinkSettings(endpoint=f"serial://{os.ttyname(theirs)}:921600")) as link:
+        vehicle.send(heartbeat())
+        await link.wait_connected(5.0)
+        link.on_attitude = lambda sample: link.send_setpoint(sample.time_boot_ms, LEVEL, 0.5)
+        vehicle.send(attitude(4))
+        assert (await vehicle.hears("SET_ATTITUDE_TARGET"))[0].time_boot_ms == 4
+        waiting = asyncio.create_task(link.command(400, timeout_s=30.0))
+        await vehicle.hears("COMMAND_LONG")
+        loop.remove_reader(ours)
         os.close(theirs)
         os.close(ours)
+        with pytest.raises(LinkLost):
+            await waiting
+        link.send_setpoint(8, LEVEL, 0.5)  # harmless
 
-    run(scene())
+
+async def test_a_full_serial_buffer_never_cuts_a_frame():
+    ours, theirs = pty.openpty()
+    tty.setraw(ours)
+    os.set_blocking(ours, False)
+    parser = dialect.MAVLink(None)
+    async with Link(LinkSettings(endpoint=f"serial://{os.ttyname(theirs)}:921600")) as link:
+        stamps, sent = [], 0
+
+        def drain():
+            try:
+                for message in parser.parse_buffer(os.read(ours, 65536)) or ():
+                    if message.get_type() == "SET_ATTITUDE_TARGET":
+                        stamps.append(message.time_boot_ms)
+            except BlockingIOError:
+                pass
+
+        for round_number in range(20):
+            for index in range(500):
+                before = link.stats.sent
+                link.send_setpoint(1000 * round_number + index, LEVEL, 0.5)
+                sent += link.stats.sent - before
+            drain()
+            await asyncio.sleep(0.002)
+        assert link.stats.not_sent > 0
+        while len(stamps) < sent:
+            drain()
+            await asyncio.sleep(0.001)
+        assert stamps == sorted(stamps)  # pymavlink would raise on a frame that was cut
+        assert len(stamps) == sent
+    os.close(theirs)
+    os.close(ours)
+
+
+async def test_a_missing_device_is_said():
+    with pytest.raises(EndpointError, match="no such device"):
+        async with Link(LinkSettings(endpoint="serial:///dev/ttyNOSUCH:57600")):
+            pass
+
+
+async def test_a_device_in_use_by_another_program_is_said():
+    ours, theirs = pty.openpty()
+    endpoint = f"serial://{os.ttyname(theirs)}:57600"
+    async with Link(LinkSettings(endpoint=endpoint)):
+        with pytest.raises(EndpointError, match="in use by another program"):
+            async with Link(LinkSettings(endpoint=endpoint)):
+                pass
+    async with Link(LinkSettings(endpoint=endpoint)):  # free again
+        pass
+    os.close(theirs)
+    os.close(ours)
 
 
 @pytest.mark.parametrize(
@@ -293,18 +260,15 @@ def test_a_device_in_use_by_another_program_is_said(run):
         (OSError("nothing known"), "at 57600 baud cannot be opened$"),
     ],
 )
-def test_why_a_device_cannot_be_opened_is_said(run, monkeypatch, fault, words):
+async def test_why_a_device_cannot_be_opened_is_said(monkeypatch, fault, words):
     def refuse(*_, **__):
         raise fault
 
     monkeypatch.setattr("serial.Serial", refuse)
 
-    async def scene():
-        with pytest.raises(EndpointError, match=f"serial /dev/ttyUSB7.*{words}"):
-            async with Link(LinkSettings(endpoint="serial:///dev/ttyUSB7:57600")):
-                pass
-
-    run(scene())
+    with pytest.raises(EndpointError, match=f"serial /dev/ttyUSB7.*{words}"):
+        async with Link(LinkSettings(endpoint="serial:///dev/ttyUSB7:57600")):
+            pass
 
 
 @pytest.mark.parametrize(
@@ -315,15 +279,12 @@ def test_why_a_device_cannot_be_opened_is_said(run, monkeypatch, fault, words):
         ("/dev/nothing", "there is no such device; is it plugged in?"),
     ],
 )
-def test_what_is_no_serial_device_is_said_without_the_text_of_a_library(run, device, words):
-    async def scene():
-        with pytest.raises(EndpointError) as caught:
-            async with Link(LinkSettings(endpoint=f"serial://{device}:57600")):
-                pass
-        assert str(caught.value).startswith(f"serial {device}: {words}")
-        assert "Errno" not in str(caught.value)
-
-    run(scene())
+async def test_what_is_no_serial_device_is_said_without_the_text_of_a_library(device, words):
+    with pytest.raises(EndpointError) as caught:
+        async with Link(LinkSettings(endpoint=f"serial://{device}:57600")):
+            pass
+    assert str(caught.value).startswith(f"serial {device}: {words}")
+    assert "Errno" not in str(caught.value)
 
 
 def test_silence_on_a_serial_port_asks_for_the_baud_rate():
@@ -361,89 +322,72 @@ def failing(name, fault, monkeypatch):
     monkeypatch.setattr(f"companion.mavlink.transport.serial_port.os.{name}", fail)
 
 
-def test_a_serial_device_that_fails_while_written_is_lost_once_and_not_at_once(run, monkeypatch):
-    async def scene():
-        async with serial_transport() as (transport, _, lost):
-            with monkeypatch.context() as patched:
-                failing("write", OSError(errno.EIO, "Input/output error"), patched)
-                assert not transport.send(b"one")
-                assert not transport.send(b"two")
-            assert not lost  # whoever sends is not called back from within
-            await asyncio.sleep(0)
-            await asyncio.sleep(0)
-            assert lost == ["serial device failed: Input/output error"]
-            assert not transport.send(b"three")
-
-    run(scene())
+async def test_a_serial_device_that_fails_while_written_is_lost_once_and_not_at_once(monkeypatch):
+    async with serial_transport() as (transport, _, lost):
+        with monkeypatch.context() as patched:
+            failing("write", OSError(errno.EIO, "Input/output error"), patched)
+            assert not transport.send(b"one")
+            assert not transport.send(b"two")
+        assert not lost  # whoever sends is not called back from within
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        assert lost == ["serial device failed: Input/output error"]
+        assert not transport.send(b"three")
 
 
-def test_a_serial_device_that_fails_while_read_is_lost(run, monkeypatch):
-    async def scene():
-        async with serial_transport() as (transport, ours, lost):
-            with monkeypatch.context() as patched:
-                failing("read", BlockingIOError(), patched)
-                transport._read()  # woken for nothing
-                assert not lost
-                failing("read", OSError(errno.ENODEV, "No such device"), patched)
-                os.write(ours, b"x")
-                await until(lambda: lost)
-            assert lost == ["serial device failed: No such device"]
-            assert not transport.send(b"frame")
-
-    run(scene())
+async def test_a_serial_device_that_fails_while_read_is_lost(monkeypatch):
+    async with serial_transport() as (transport, ours, lost):
+        with monkeypatch.context() as patched:
+            failing("read", BlockingIOError(), patched)
+            transport._read()  # woken for nothing
+            assert not lost
+            failing("read", OSError(errno.ENODEV, "No such device"), patched)
+            os.write(ours, b"x")
+            await until(lambda: lost)
+        assert lost == ["serial device failed: No such device"]
+        assert not transport.send(b"frame")
 
 
-def test_the_rest_of_a_frame_waits_for_room_or_ends_the_device(run, monkeypatch):
-    async def scene():
-        async with serial_transport() as (transport, _, lost):
-            frame = bytes(range(256)) * 1024  # more than the terminal takes at once
-            assert transport.send(frame)
-            assert not transport.send(b"next")  # the frame before it is not finished
-            with monkeypatch.context() as patched:
-                failing("write", BlockingIOError(), patched)
-                transport._write_rest()
-                assert not lost
-                assert not transport.send(b"next")
-                failing("write", OSError(errno.EIO, "Input/output error"), patched)
-                transport._write_rest()
-            assert lost == ["serial device failed: Input/output error"]
-
-    run(scene())
+async def test_the_rest_of_a_frame_waits_for_room_or_ends_the_device(monkeypatch):
+    async with serial_transport() as (transport, _, lost):
+        frame = bytes(range(256)) * 1024  # more than the terminal takes at once
+        assert transport.send(frame)
+        assert not transport.send(b"next")  # the frame before it is not finished
+        with monkeypatch.context() as patched:
+            failing("write", BlockingIOError(), patched)
+            transport._write_rest()
+            assert not lost
+            assert not transport.send(b"next")
+            failing("write", OSError(errno.EIO, "Input/output error"), patched)
+            transport._write_rest()
+        assert lost == ["serial device failed: Input/output error"]
 
 
-def test_udp_vehicle_may_come_back_from_another_port(run, monkeypatch):
+async def test_udp_vehicle_may_come_back_from_another_port(monkeypatch):
     monkeypatch.setattr(udp_module, "PEER_SILENCE_S", 0.05)
 
-    async def scene():
-        async with linked() as (link, _):
-            other = await FakeVehicle(link.local_address).open_udp()
+    async with linked() as (link, _):
+        other = await FakeVehicle(link.local_address).open_udp()
 
-            def heard():
-                other.send(heartbeat(0x00060000))
-                return link.state.mode == "OFFBOARD"
+        def heard():
+            other.send(heartbeat(0x00060000))
+            return link.state.mode == "OFFBOARD"
 
-            await until(heard)
-            link.send_setpoint(4, LEVEL, 0.5)
-            await other.hears("SET_ATTITUDE_TARGET")
-            other.close()
-
-    run(scene())
+        await until(heard)
+        link.send_setpoint(4, LEVEL, 0.5)
+        await other.hears("SET_ATTITUDE_TARGET")
+        other.close()
 
 
-def test_a_sample_of_udp_is_as_old_as_its_way_through_this_computer(run):
+async def test_a_sample_of_udp_is_as_old_as_its_way_through_this_computer():
     """Whoever wakes up late must not count from there."""
 
-    async def scene():
-        async with linked() as (link, vehicle):
-            ages = []
-            link.on_attitude = lambda sample: ages.append(
-                time.perf_counter_ns() - sample.received_ns
-            )
-            # Linux begins to stamp datagrams a moment after the first socket has asked for it.
-            await asyncio.sleep(0.1)
-            vehicle.send(attitude(100, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-            time.sleep(0.03)  # noqa: ASYNC251 - this process is held up
-            await until(lambda: ages)
-            assert 0.03e9 <= ages[0] < 1e9
-
-    run(scene())
+    async with linked() as (link, vehicle):
+        ages = []
+        link.on_attitude = lambda sample: ages.append(time.perf_counter_ns() - sample.received_ns)
+        # Linux begins to stamp datagrams a moment after the first socket has asked for it.
+        await asyncio.sleep(0.1)
+        vehicle.send(attitude(100, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        time.sleep(0.03)  # noqa: ASYNC251 - this process is held up
+        await until(lambda: ages)
+        assert 0.03e9 <= ages[0] < 1e9

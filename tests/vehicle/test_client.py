@@ -36,81 +36,66 @@ def text(words, severity=4, number=0, chunk=0):
     return dialect.MAVLink_statustext_message(severity, words.encode(), number, chunk)
 
 
-def test_an_accepted_command_carries_its_parameters(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 0)]
-            await link.command(ARM, 1.0, 2.0)
-            await link.command(*Px4().take_off(10.0, 30.0))
-            arm, take_off = vehicle.of("COMMAND_LONG")
-            assert (arm.command, arm.param1, arm.param2, arm.param7) == (ARM, 1.0, 2.0, 0.0)
-            assert (arm.target_system, arm.target_component, arm.confirmation) == (1, 1, 0)
-            assert (take_off.command, take_off.param7) == (22, 40.0)
-            assert take_off.param5 != take_off.param5  # NaN: where it is
-
-    run(scene())
+async def test_an_accepted_command_carries_its_parameters():
+    async with linked() as (link, vehicle):
+        vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 0)]
+        await link.command(ARM, 1.0, 2.0)
+        await link.command(*Px4().take_off(10.0, 30.0))
+        arm, take_off = vehicle.of("COMMAND_LONG")
+        assert (arm.command, arm.param1, arm.param2, arm.param7) == (ARM, 1.0, 2.0, 0.0)
+        assert (arm.target_system, arm.target_component, arm.confirmation) == (1, 1, 0)
+        assert (take_off.command, take_off.param7) == (22, 40.0)
+        assert take_off.param5 != take_off.param5  # NaN: where it is
 
 
-def test_a_refusal_has_the_autopilots_words_before_and_after_the_ack(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            vehicle.send(text("something old\t"))
-            await asyncio.sleep(0.01)
-            vehicle.answers["COMMAND_LONG"] = lambda message: [
-                text("Arming denied: \t"),
-                ack(message.command, 1),
-                text("Resolve system health failures first\t"),
-            ]
-            with pytest.raises(CommandRefused) as caught:
-                await link.command(ARM, 1.0)
-            assert caught.value.result_name == "TEMPORARILY_REJECTED"
-            assert caught.value.texts == ("Arming denied:", "Resolve system health failures first")
-            assert "MAV_CMD_COMPONENT_ARM_DISARM" in str(caught.value)
-            assert len(vehicle.of("COMMAND_LONG")) == 1
-
-    run(scene())
-
-
-def test_a_lost_command_is_repeated_with_a_rising_confirmation(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            vehicle.answers["COMMAND_LONG"] = lambda message: (
-                [ack(message.command, 0)] if message.confirmation == 2 else []
-            )
-            await link.command(ARM, 1.0, timeout_s=0.02)
-            assert [message.confirmation for message in vehicle.of("COMMAND_LONG")] == [0, 1, 2]
-
-    run(scene())
-
-
-def test_silence_is_a_timeout_after_all_tries(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            with pytest.raises(CommandTimeout, match="after 3 tries"):
-                await link.command(ARM, 1.0, timeout_s=0.01, retries=2)
-            assert len(vehicle.of("COMMAND_LONG")) == 3
-            # Nothing of it is left: the next command works.
-            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 0)]
+async def test_a_refusal_has_the_autopilots_words_before_and_after_the_ack():
+    async with linked() as (link, vehicle):
+        vehicle.send(text("something old\t"))
+        await asyncio.sleep(0.01)
+        vehicle.answers["COMMAND_LONG"] = lambda message: [
+            text("Arming denied: \t"),
+            ack(message.command, 1),
+            text("Resolve system health failures first\t"),
+        ]
+        with pytest.raises(CommandRefused) as caught:
             await link.command(ARM, 1.0)
-
-    run(scene())
-
-
-def test_in_progress_is_waited_for_and_not_repeated(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 5)]
-            task = asyncio.create_task(link.command(ARM, timeout_s=0.02))
-            await asyncio.sleep(0.1)
-            assert not task.done()
-            vehicle.send(ack(ARM, 0))
-            await task
-            assert len(vehicle.of("COMMAND_LONG")) == 1
-
-    run(scene())
+        assert caught.value.result_name == "TEMPORARILY_REJECTED"
+        assert caught.value.texts == ("Arming denied:", "Resolve system health failures first")
+        assert "MAV_CMD_COMPONENT_ARM_DISARM" in str(caught.value)
+        assert len(vehicle.of("COMMAND_LONG")) == 1
 
 
-def test_a_command_that_stays_in_progress_is_no_silence(run, monkeypatch):
+async def test_a_lost_command_is_repeated_with_a_rising_confirmation():
+    async with linked() as (link, vehicle):
+        vehicle.answers["COMMAND_LONG"] = lambda message: (
+            [ack(message.command, 0)] if message.confirmation == 2 else []
+        )
+        await link.command(ARM, 1.0, timeout_s=0.02)
+        assert [message.confirmation for message in vehicle.of("COMMAND_LONG")] == [0, 1, 2]
+
+
+async def test_silence_is_a_timeout_after_all_tries():
+    async with linked() as (link, vehicle):
+        with pytest.raises(CommandTimeout, match="after 3 tries"):
+            await link.command(ARM, 1.0, timeout_s=0.01, retries=2)
+        assert len(vehicle.of("COMMAND_LONG")) == 3
+        # Nothing of it is left: the next command works.
+        vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 0)]
+        await link.command(ARM, 1.0)
+
+
+async def test_in_progress_is_waited_for_and_not_repeated():
+    async with linked() as (link, vehicle):
+        vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 5)]
+        task = asyncio.create_task(link.command(ARM, timeout_s=0.02))
+        await asyncio.sleep(0.1)
+        assert not task.done()
+        vehicle.send(ack(ARM, 0))
+        await task
+        assert len(vehicle.of("COMMAND_LONG")) == 1
+
+
+async def test_a_command_that_stays_in_progress_is_no_silence(monkeypatch):
     """It is not repeated, and has a time for the whole, however often it is called in progress."""
     monkeypatch.setattr("companion.mavlink.commands._IN_PROGRESS_TIMEOUT_S", 0.1)
 
@@ -119,17 +104,14 @@ def test_a_command_that_stays_in_progress_is_no_silence(run, monkeypatch):
             vehicle.send(ack(ARM, 5))
             await asyncio.sleep(0.03)
 
-    async def scene():
-        async with linked() as (link, vehicle):
-            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 5)]
-            repeating = asyncio.create_task(repeat(vehicle))
-            async with asyncio.timeout(5.0):
-                with pytest.raises(CommandUnfinished, match=r"ARM_DISARM: .* gave no result"):
-                    await link.command(ARM, timeout_s=0.5, retries=1)
-            repeating.cancel()
-            assert len(vehicle.of("COMMAND_LONG")) == 1
-
-    run(scene())
+    async with linked() as (link, vehicle):
+        vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 5)]
+        repeating = asyncio.create_task(repeat(vehicle))
+        async with asyncio.timeout(5.0):
+            with pytest.raises(CommandUnfinished, match=r"ARM_DISARM: .* gave no result"):
+                await link.command(ARM, timeout_s=0.5, retries=1)
+        repeating.cancel()
+        assert len(vehicle.of("COMMAND_LONG")) == 1
 
 
 async def cancel_once_sent(link, vehicle):
@@ -139,86 +121,68 @@ async def cancel_once_sent(link, vehicle):
     cancelled.cancel()
 
 
-def test_a_late_ack_of_a_cancelled_command_does_not_count_for_the_next_one(run):
+async def test_a_late_ack_of_a_cancelled_command_does_not_count_for_the_next_one():
     """A hold is cancelled; its ACK must not count for the landing, which the autopilot refuses."""
 
-    async def scene():
-        async with linked() as (link, vehicle):
-            await cancel_once_sent(link, vehicle)
-            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0), ack(SET_MODE, 4)]
-            with pytest.raises(CommandRefused, match="FAILED"):
-                await link.command(SET_MODE, 1.0, 6.0)
-            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0)]
+    async with linked() as (link, vehicle):
+        await cancel_once_sent(link, vehicle)
+        vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0), ack(SET_MODE, 4)]
+        with pytest.raises(CommandRefused, match="FAILED"):
+            await link.command(SET_MODE, 1.0, 6.0)
+        vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0)]
+        await link.command(SET_MODE, 1.0, 6.0)
+
+
+async def test_a_cancelled_command_that_was_lost_costs_the_next_one_a_repetition():
+    async with linked() as (link, vehicle):
+        await cancel_once_sent(link, vehicle)
+        vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0)]
+        await link.command(SET_MODE, 1.0, 6.0, timeout_s=0.02)
+        assert len(vehicle.of("COMMAND_LONG")) == 3
+
+
+async def test_an_ack_that_waited_while_we_stood_still_does_not_count_for_the_next_command():
+    async with linked() as (link, vehicle):
+        stalled = asyncio.create_task(link.command(SET_MODE, 4.0, timeout_s=0.02, retries=0))
+        await until(lambda: vehicle.of("COMMAND_LONG"))
+        time.sleep(0.15)  # noqa: ASYNC251 - the process stands still
+        with pytest.raises(CommandTimeout):
+            await stalled
+        vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0), ack(SET_MODE, 4)]
+        with pytest.raises(CommandRefused, match="FAILED"):
             await link.command(SET_MODE, 1.0, 6.0)
 
-    run(scene())
+
+async def test_acks_for_others_and_for_other_commands_do_not_count():
+    async with linked() as (link, vehicle):
+        vehicle.answers["COMMAND_LONG"] = lambda message: [
+            ack(message.command, 4, system=255, component=190),
+            ack(message.command, 4, component=100),
+            ack(21, 4),
+            ack(message.command, 0),
+        ]
+        await link.command(ARM)
 
 
-def test_a_cancelled_command_that_was_lost_costs_the_next_one_a_repetition(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            await cancel_once_sent(link, vehicle)
-            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0)]
-            await link.command(SET_MODE, 1.0, 6.0, timeout_s=0.02)
-            assert len(vehicle.of("COMMAND_LONG")) == 3
-
-    run(scene())
-
-
-def test_an_ack_that_waited_while_we_stood_still_does_not_count_for_the_next_command(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            stalled = asyncio.create_task(link.command(SET_MODE, 4.0, timeout_s=0.02, retries=0))
-            await until(lambda: vehicle.of("COMMAND_LONG"))
-            time.sleep(0.15)  # noqa: ASYNC251 - the process stands still
-            with pytest.raises(CommandTimeout):
-                await stalled
-            vehicle.answers["COMMAND_LONG"] = lambda message: [ack(SET_MODE, 0), ack(SET_MODE, 4)]
-            with pytest.raises(CommandRefused, match="FAILED"):
-                await link.command(SET_MODE, 1.0, 6.0)
-
-    run(scene())
+async def test_two_commands_of_a_kind_wait_for_each_other():
+    async with linked() as (link, vehicle):
+        results = {1.0: 0, 0.0: 4}
+        vehicle.answers["COMMAND_LONG"] = lambda message: [
+            ack(message.command, results[message.param1])
+        ]
+        outcomes = await asyncio.gather(
+            link.command(ARM, 1.0), link.command(ARM, 0.0), return_exceptions=True
+        )
+        assert outcomes[0] is None
+        assert isinstance(outcomes[1], CommandRefused)
 
 
-def test_acks_for_others_and_for_other_commands_do_not_count(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            vehicle.answers["COMMAND_LONG"] = lambda message: [
-                ack(message.command, 4, system=255, component=190),
-                ack(message.command, 4, component=100),
-                ack(21, 4),
-                ack(message.command, 0),
-            ]
-            await link.command(ARM)
-
-    run(scene())
-
-
-def test_two_commands_of_a_kind_wait_for_each_other(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            results = {1.0: 0, 0.0: 4}
-            vehicle.answers["COMMAND_LONG"] = lambda message: [
-                ack(message.command, results[message.param1])
-            ]
-            outcomes = await asyncio.gather(
-                link.command(ARM, 1.0), link.command(ARM, 0.0), return_exceptions=True
-            )
-            assert outcomes[0] is None
-            assert isinstance(outcomes[1], CommandRefused)
-
-    run(scene())
-
-
-def test_what_waits_when_the_link_closes_is_told(run):
-    async def scene():
-        async with linked() as (link, _):
-            waiting = asyncio.create_task(link.command(ARM, timeout_s=30.0))
-            await asyncio.sleep(0)
-        with pytest.raises(LinkLost):
-            await waiting
-
-    run(scene())
+async def test_what_waits_when_the_link_closes_is_told():
+    async with linked() as (link, _):
+        waiting = asyncio.create_task(link.command(ARM, timeout_s=30.0))
+        await asyncio.sleep(0)
+    with pytest.raises(LinkLost):
+        await waiting
 
 
 def test_names_of_commands_and_results():
@@ -227,20 +191,17 @@ def test_names_of_commands_and_results():
     assert (result_name(2), result_name(77)) == ("DENIED", "RESULT 77")
 
 
-def test_a_message_is_asked_for_and_returned(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            vehicle.answers["COMMAND_LONG"] = lambda message: [
-                ack(message.command, 0),
-                *([attitude(77)] if message.param1 == 31 else []),
-            ]
-            assert (await link.request_message("ATTITUDE_QUATERNION")).time_boot_ms == 77
-            with pytest.raises(LinkTimeout, match="ODOMETRY"):
-                await link.request_message("ODOMETRY", timeout_s=0.02)
-            with pytest.raises(UnknownMessage):
-                await link.request_message("NO_SUCH_THING")
-
-    run(scene())
+async def test_a_message_is_asked_for_and_returned():
+    async with linked() as (link, vehicle):
+        vehicle.answers["COMMAND_LONG"] = lambda message: [
+            ack(message.command, 0),
+            *([attitude(77)] if message.param1 == 31 else []),
+        ]
+        assert (await link.request_message("ATTITUDE_QUATERNION")).time_boot_ms == 77
+        with pytest.raises(LinkTimeout, match="ODOMETRY"):
+            await link.request_message("ODOMETRY", timeout_s=0.02)
+        with pytest.raises(UnknownMessage):
+            await link.request_message("NO_SUCH_THING")
 
 
 class ParameterVehicle:
@@ -273,162 +234,135 @@ class ParameterVehicle:
         return [dialect.MAVLink_param_value_message(name.encode(), number, self.kinds[name], 2, 0)]
 
 
-def test_parameters_of_both_kinds_are_read_and_written(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            ParameterVehicle(vehicle)
-            assert await link.read_parameter("COM_OF_LOSS_T") == 1.0
-            assert await link.write_parameter("COM_OF_LOSS_T", 0.5) == 0.5
-            for number in (3, -1, 2**31 - 1, -(2**31), 1_000_000):
-                held = await link.write_parameter("COM_OBL_RC_ACT", number)
-                assert (held, type(held)) == (number, int)
-                assert await link.read_parameter("COM_OBL_RC_ACT") == number
-
-    run(scene())
+async def test_parameters_of_both_kinds_are_read_and_written():
+    async with linked() as (link, vehicle):
+        ParameterVehicle(vehicle)
+        assert await link.read_parameter("COM_OF_LOSS_T") == 1.0
+        assert await link.write_parameter("COM_OF_LOSS_T", 0.5) == 0.5
+        for number in (3, -1, 2**31 - 1, -(2**31), 1_000_000):
+            held = await link.write_parameter("COM_OBL_RC_ACT", number)
+            assert (held, type(held)) == (number, int)
+            assert await link.read_parameter("COM_OBL_RC_ACT") == number
 
 
-def test_a_lost_parameter_request_is_repeated(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            ParameterVehicle(vehicle).deaf = 2
-            assert await link.read_parameter("COM_OF_LOSS_T", timeout_s=0.02) == 1.0
-
-    run(scene())
+async def test_a_lost_parameter_request_is_repeated():
+    async with linked() as (link, vehicle):
+        ParameterVehicle(vehicle).deaf = 2
+        assert await link.read_parameter("COM_OF_LOSS_T", timeout_s=0.02) == 1.0
 
 
-def test_a_second_answer_to_a_read_is_no_answer_to_the_write_after_it(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            parameters = ParameterVehicle(vehicle)
+async def test_a_second_answer_to_a_read_is_no_answer_to_the_write_after_it():
+    async with linked() as (link, vehicle):
+        parameters = ParameterVehicle(vehicle)
 
-            def write(message):
-                old = parameters.value(message.param_id)
-                return [*old, *parameters.write(message)]
+        def write(message):
+            old = parameters.value(message.param_id)
+            return [*old, *parameters.write(message)]
 
-            vehicle.answers["PARAM_SET"] = write
-            assert await link.write_parameter("COM_OF_LOSS_T", 0.5) == 0.5
-
-    run(scene())
+        vehicle.answers["PARAM_SET"] = write
+        assert await link.write_parameter("COM_OF_LOSS_T", 0.5) == 0.5
 
 
-def test_unknown_parameters_by_silence_and_by_error(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            parameters = ParameterVehicle(vehicle)
-            with pytest.raises(UnansweredParameter, match="COM_OF_LOST: no answer after 2 tries"):
-                await link.read_parameter("COM_OF_LOST", timeout_s=0.01, retries=1)
-            with pytest.raises(UnknownParameter, match="1 to 16"):
-                await link.read_parameter("A_NAME_THAT_IS_TOO_LONG")
-            parameters.value = lambda name: [
-                dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 1)
-            ]
-            with pytest.raises(UnknownParameter, match="has no such parameter") as told:
-                await link.read_parameter("COM_OF_LOST")
-            assert not isinstance(told.value, UnansweredParameter)
-            parameters.value = lambda name: [
-                dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 5)
-            ]
-            with pytest.raises(ParameterRefused, match="read-only"):
-                await link.read_parameter("COM_OF_LOSS_T")
-
-    run(scene())
+async def test_unknown_parameters_by_silence_and_by_error():
+    async with linked() as (link, vehicle):
+        parameters = ParameterVehicle(vehicle)
+        with pytest.raises(UnansweredParameter, match="COM_OF_LOST: no answer after 2 tries"):
+            await link.read_parameter("COM_OF_LOST", timeout_s=0.01, retries=1)
+        with pytest.raises(UnknownParameter, match="1 to 16"):
+            await link.read_parameter("A_NAME_THAT_IS_TOO_LONG")
+        parameters.value = lambda name: [
+            dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 1)
+        ]
+        with pytest.raises(UnknownParameter, match="has no such parameter") as told:
+            await link.read_parameter("COM_OF_LOST")
+        assert not isinstance(told.value, UnansweredParameter)
+        parameters.value = lambda name: [
+            dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 5)
+        ]
+        with pytest.raises(ParameterRefused, match="read-only"):
+            await link.read_parameter("COM_OF_LOSS_T")
 
 
-def test_a_value_that_cannot_be_held_is_refused(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            parameters = ParameterVehicle(vehicle)
-            for bad in (0.5, 2**31, float("nan")):
-                with pytest.raises(ParameterRefused, match="cannot hold"):
-                    await link.write_parameter("COM_OBL_RC_ACT", bad)
+async def test_a_value_that_cannot_be_held_is_refused():
+    async with linked() as (link, vehicle):
+        parameters = ParameterVehicle(vehicle)
+        for bad in (0.5, 2**31, float("nan")):
             with pytest.raises(ParameterRefused, match="cannot hold"):
-                await link.write_parameter("COM_OF_LOSS_T", float("inf"))
-            parameters.locked = True
-            with pytest.raises(ParameterRefused, match="keeps 0 instead of 4"):
-                await link.write_parameter("COM_OBL_RC_ACT", 4)
-
-    run(scene())
+                await link.write_parameter("COM_OBL_RC_ACT", bad)
+        with pytest.raises(ParameterRefused, match="cannot hold"):
+            await link.write_parameter("COM_OF_LOSS_T", float("inf"))
+        parameters.locked = True
+        with pytest.raises(ParameterRefused, match="keeps 0 instead of 4"):
+            await link.write_parameter("COM_OBL_RC_ACT", 4)
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
-def test_what_is_no_number_is_read_as_it_came_even_of_an_integer(run, number):
+async def test_what_is_no_number_is_read_as_it_came_even_of_an_integer(number):
     """ArduPilot sends integers as numbers in a float."""
 
-    async def scene():
-        async with linked(autopilot=ARDUPILOT) as (link, vehicle):
-            told = dialect.MAVLink_param_value_message(b"GUID_OPTIONS", number, INT32, 1, 0)
-            vehicle.answers["PARAM_REQUEST_READ"] = lambda _: [told]
-            read = await link.read_parameter("GUID_OPTIONS")
-            assert isinstance(read, float)
-            assert str(read) == str(number)
-
-    run(scene())
+    async with linked(autopilot=ARDUPILOT) as (link, vehicle):
+        told = dialect.MAVLink_param_value_message(b"GUID_OPTIONS", number, INT32, 1, 0)
+        vehicle.answers["PARAM_REQUEST_READ"] = lambda _: [told]
+        read = await link.read_parameter("GUID_OPTIONS")
+        assert isinstance(read, float)
+        assert str(read) == str(number)
 
 
-def test_rates_are_asked_for_and_counted(run):
-    async def scene():
-        async with linked() as (link, vehicle):
+async def test_rates_are_asked_for_and_counted():
+    async with linked() as (link, vehicle):
 
-            def answer(message):
-                if message.param1 != 31:
-                    return [ack(message.command, 3)]
-                burst = [attitude(4 * index) for index in range(20)]
-                asyncio.get_running_loop().call_later(0.02, vehicle.send, *burst)
-                return [ack(message.command, 0)]
+        def answer(message):
+            if message.param1 != 31:
+                return [ack(message.command, 3)]
+            burst = [attitude(4 * index) for index in range(20)]
+            asyncio.get_running_loop().call_later(0.02, vehicle.send, *burst)
+            return [ack(message.command, 0)]
 
-            vehicle.answers["COMMAND_LONG"] = answer
-            rates = await link.set_rates(
-                {"ODOMETRY": 400.0, "ATTITUDE_QUATERNION": 250.0}, window_s=0.2
-            )
-            first, second = vehicle.of("COMMAND_LONG")
-            assert (first.command, first.param1, first.param2) == (511, 331.0, 2500.0)
-            assert (second.param1, second.param2) == (31.0, 4000.0)
-            assert rates["ODOMETRY"] == (400.0, 0.0, 0.0, "UNSUPPORTED")
-            asked, granted, achieved, refusal = rates["ATTITUDE_QUATERNION"]
-            assert (asked, granted, refusal) == (250.0, 250.0, "")
-            assert 20 / 0.4 < achieved <= 20 / 0.2 + 1e-6
-            with pytest.raises(UnknownMessage):
-                await link.set_rates({"ATTITUDE": 50.0, "NONSENSE": 1.0})
-            assert len(vehicle.of("COMMAND_LONG")) == 2
-
-    run(scene())
+        vehicle.answers["COMMAND_LONG"] = answer
+        rates = await link.set_rates(
+            {"ODOMETRY": 400.0, "ATTITUDE_QUATERNION": 250.0}, window_s=0.2
+        )
+        first, second = vehicle.of("COMMAND_LONG")
+        assert (first.command, first.param1, first.param2) == (511, 331.0, 2500.0)
+        assert (second.param1, second.param2) == (31.0, 4000.0)
+        assert rates["ODOMETRY"] == (400.0, 0.0, 0.0, "UNSUPPORTED")
+        asked, granted, achieved, refusal = rates["ATTITUDE_QUATERNION"]
+        assert (asked, granted, refusal) == (250.0, 250.0, "")
+        assert 20 / 0.4 < achieved <= 20 / 0.2 + 1e-6
+        with pytest.raises(UnknownMessage):
+            await link.set_rates({"ATTITUDE": 50.0, "NONSENSE": 1.0})
+        assert len(vehicle.of("COMMAND_LONG")) == 2
 
 
-def test_timesync_tells_how_old_a_sample_was_when_it_arrived(run):
-    async def scene():
-        async with linked() as (link, vehicle):
-            clock, ahead = asyncio.get_running_loop().time, 1000.0
+async def test_timesync_tells_how_old_a_sample_was_when_it_arrived():
+    async with linked() as (link, vehicle):
+        clock, ahead = asyncio.get_running_loop().time, 1000.0
 
-            def answer(message):
-                if message.tc1:
-                    return []
-                stamp = round((clock() + ahead) * 1e9)
-                return [
-                    dialect.MAVLink_timesync_message(stamp + 10**12, message.ts1 + 1),  # another's
-                    dialect.MAVLink_timesync_message(stamp, message.ts1),
-                ]
+        def answer(message):
+            if message.tc1:
+                return []
+            stamp = round((clock() + ahead) * 1e9)
+            return [
+                dialect.MAVLink_timesync_message(stamp + 10**12, message.ts1 + 1),  # another's
+                dialect.MAVLink_timesync_message(stamp, message.ts1),
+            ]
 
-            vehicle.answers["TIMESYNC"] = answer
-            while not link.clock.age_known:
-                stamp = round(1000 * (clock() + ahead - 0.5))
-                vehicle.send(dialect.MAVLink_attitude_quaternion_message(stamp, 1, *6 * [0]))
-                await asyncio.sleep(0.02)
-            delay = link.clock.delay
-            error = delay.largest_possible(clock()) - delay.seconds + link.timesync.round_trip_s
-            assert delay.seconds == pytest.approx(0.5, abs=0.05 + error)
-            age = link.clock.age(clock() + ahead - 1.0, clock())
-            assert age == pytest.approx(1.0, abs=0.05 + error)
-            assert link.clock.age(clock() + ahead + 1.0, clock()) == 0.0  # never negative
-
-    run(scene())
+        vehicle.answers["TIMESYNC"] = answer
+        while not link.clock.age_known:
+            stamp = round(1000 * (clock() + ahead - 0.5))
+            vehicle.send(dialect.MAVLink_attitude_quaternion_message(stamp, 1, *6 * [0]))
+            await asyncio.sleep(0.02)
+        delay = link.clock.delay
+        error = delay.largest_possible(clock()) - delay.seconds + link.timesync.round_trip_s
+        assert delay.seconds == pytest.approx(0.5, abs=0.05 + error)
+        age = link.clock.age(clock() + ahead - 1.0, clock())
+        assert age == pytest.approx(1.0, abs=0.05 + error)
+        assert link.clock.age(clock() + ahead + 1.0, clock()) == 0.0  # never negative
 
 
-def test_the_vehicles_own_timesync_is_answered(run):
-    async def scene():
-        async with linked() as (_, vehicle):
-            vehicle.send(dialect.MAVLink_timesync_message(0, 987654321))
-            await until(lambda: any(message.tc1 for message in vehicle.of("TIMESYNC")))
-            answers = [message for message in vehicle.of("TIMESYNC") if message.tc1]
-            assert answers[0].ts1 == 987654321
-
-    run(scene())
+async def test_the_vehicles_own_timesync_is_answered():
+    async with linked() as (_, vehicle):
+        vehicle.send(dialect.MAVLink_timesync_message(0, 987654321))
+        await until(lambda: any(message.tc1 for message in vehicle.of("TIMESYNC")))
+        answers = [message for message in vehicle.of("TIMESYNC") if message.tc1]
+        assert answers[0].ts1 == 987654321
