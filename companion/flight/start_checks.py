@@ -42,30 +42,18 @@ def check_control(config: Config) -> None:
 
 
 def require_extras(config: Config) -> None:
-    """Check that the optional packages that a flight needs are installed.
-
-    Raises:
-        MissingExtraError: a package is not installed.
-    """
+    """Check that the optional packages of a flight are installed. Raises `MissingExtraError`."""
     require_solver(config)
     require_backend(config)
 
 
 def require_solver(config: Config) -> None:
-    """Check that the package of predictive control is installed.
-
-    Raises:
-        MissingExtraError: the package is not installed.
-    """
+    """Check that the package of predictive control is installed. Raises `MissingExtraError`."""
     if config.guidance.kind == "nmpc":
         require("casadi", "nmpc", "guidance.kind: nmpc")
 
 
 def require_backend(config: Config) -> None:
-    """Check that the package of the link's backend is installed.
-
-    Raises:
-        MissingExtraError: the package is not installed.
-    """
+    """Check that the package of the link's backend is installed. Raises `MissingExtraError`."""
     if config.link.backend == "mavsdk":
         require("mavsdk", "mavsdk", "link.backend: mavsdk")

@@ -111,10 +111,9 @@ class ParameterFinding(NamedTuple):
     """The autopilot's value."""
     result: CheckResult
     consequence: str = ""
-    """Consequence of the value; empty if it is safe."""
+    """As in `Problem`; empty if the value is safe."""
     set_to: float | None = None
-    """Value to which the parameter should be set; `None` if the value is safe, only the user can
-    know a better one, or the configuration must change."""
+    """As in `Problem`; `None` also if the value is safe."""
 
 
 def apply_rules(
@@ -133,8 +132,5 @@ def apply_rules(
         problem = (
             rule.check(value, finite_values, settings) if isfinite(value) else _NOT_FINITE_PROBLEM
         )
-        if problem is None:
-            findings.append(ParameterFinding(rule, value, CheckResult.SAFE))
-        else:
-            findings.append(ParameterFinding(rule, value, *problem))
+        findings.append(ParameterFinding(rule, value, *(problem or (CheckResult.SAFE,))))
     return findings

@@ -1,4 +1,4 @@
-"""Records of the vehicle's telemetry, each with its time of arrival."""
+"""Records of the vehicle's telemetry; `received` is the event-loop time of arrival, s."""
 
 from typing import NamedTuple
 
@@ -53,7 +53,6 @@ class Heartbeat(NamedTuple):
     """HEARTBEAT of the autopilot."""
 
     received: float
-    """Event-loop time of arrival, s."""
     mode: str
     """The autopilot's name for the mode."""
     armed: bool
@@ -65,7 +64,6 @@ class CurrentMode(NamedTuple):
     """CURRENT_MODE of the autopilot."""
 
     received: float
-    """Event-loop time of arrival, s."""
     mode: str
     """The autopilot's name for the mode."""
     intended: str
@@ -76,7 +74,6 @@ class LocalPosition(NamedTuple):
     """LOCAL_POSITION_NED."""
 
     received: float
-    """Event-loop time of arrival, s."""
     vehicle_time: float
     """The vehicle's time stamp, s, on the clock of `AttitudeSample.vehicle_time`."""
     position_ned: Vector
@@ -89,7 +86,6 @@ class LandedState(NamedTuple):
     """EXTENDED_SYS_STATE."""
 
     received: float
-    """Event-loop time of arrival, s."""
     state: int
     """MAV_LANDED_STATE: 1 on ground, 2 in air, 3 taking off, 4 landing."""
 
@@ -98,7 +94,6 @@ class GlobalPosition(NamedTuple):
     """GLOBAL_POSITION_INT."""
 
     received: float
-    """Event-loop time of arrival, s."""
     latitude_deg: float
     """Latitude (WGS84), °."""
     longitude_deg: float
@@ -109,7 +104,6 @@ class Battery(NamedTuple):
     """SYS_STATUS or BATTERY_STATUS; a value that the vehicle does not know is `None`."""
 
     received: float
-    """Event-loop time of arrival, s."""
     voltage_v: float | None
     """Voltage of the whole battery, V."""
     remaining: float | None
@@ -134,7 +128,6 @@ class AttitudeTargetThrust(NamedTuple):
     """ATTITUDE_TARGET: the thrust setpoint of the autopilot, whatever its source."""
 
     received: float
-    """Event-loop time of arrival, s."""
     thrust: float
     """Collective thrust, 0..1."""
 
@@ -152,7 +145,6 @@ class Gps(NamedTuple):
     """GPS_RAW_INT."""
 
     received: float
-    """Event-loop time of arrival, s."""
     fix_type: int
     """GPS_FIX_TYPE; 3 or more is a 3D fix."""
     satellites: int | None
@@ -172,7 +164,6 @@ class PrearmStatus(NamedTuple):
     """SYS_STATUS: the autopilot's own pre-arm checks."""
 
     received: float
-    """Event-loop time of arrival, s."""
     passed: bool
     """Whether the checks pass."""
 
@@ -181,7 +172,6 @@ class Home(NamedTuple):
     """HOME_POSITION."""
 
     received: float
-    """Event-loop time of arrival, s."""
     latitude_deg: float
     """Latitude (WGS84), °."""
     longitude_deg: float
@@ -196,6 +186,5 @@ class EstimatorStatus(NamedTuple):
     """ESTIMATOR_STATUS (PX4) or EKF_STATUS_REPORT (ArduPilot), whose flags mean the same."""
 
     received: float
-    """Event-loop time of arrival, s."""
     flags: int
     """ESTIMATOR_STATUS_FLAGS."""

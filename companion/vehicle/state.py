@@ -82,8 +82,7 @@ class VehicleState(ModeState, _NewestRecords):
     ) -> None:
         _NewestRecords.__init__(self)
         ModeState.__init__(self, dispatcher, clock)
-        self._stats, self._text_assembler = stats, texts
-        self._vehicle_clock = vehicle_clock
+        self._stats, self._vehicle_clock = stats, vehicle_clock
         self.texts = texts.texts
         for name, callback in {
             "EXTENDED_SYS_STATE": self._on_extended_sys_state,
@@ -96,7 +95,7 @@ class VehicleState(ModeState, _NewestRecords):
             "HOME_POSITION": self._on_home,
             "ESTIMATOR_STATUS": self._on_estimator,
             "EKF_STATUS_REPORT": self._on_estimator,
-            "STATUSTEXT": self._on_text,
+            "STATUSTEXT": lambda message: texts.take(message, clock()),
         }.items():
             dispatcher.subscribe(name, callback)
         dispatcher.subscribe_raw("ODOMETRY", self._on_odometry)
@@ -243,6 +242,3 @@ class VehicleState(ModeState, _NewestRecords):
 
     def _on_estimator(self, message: Message) -> None:
         self.estimator = EstimatorStatus(self._clock(), message.flags)
-
-    def _on_text(self, message: Message) -> None:
-        self._text_assembler.take(message, self._clock())

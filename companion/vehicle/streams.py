@@ -14,9 +14,7 @@ _DISABLED_INTERVAL = -1.0
 _TIMEOUT_S = 1.0
 _RETRIES = 3
 _MAX_HALVINGS = 3
-_ROUNDING_TOLERANCE = (
-    1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not lose a whole step
-)
+_ROUNDING_TOLERANCE = 1e-6  # so that a rounding error, as in 1e6 / 333.333…, loses no step
 
 
 class StreamRate(NamedTuple):

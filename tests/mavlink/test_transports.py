@@ -166,9 +166,16 @@ async def test_an_unknown_host_is_said(scheme):
             pass
 
 
-async def test_an_address_that_is_not_ours_is_said():
-    with pytest.raises(EndpointError, match="no interface"):
-        async with Link(LinkSettings(endpoint="udpin://192.0.2.1:0")):
+@pytest.mark.parametrize(
+    ("endpoint", "words"),
+    [
+        ("udpin://192.0.2.1:0", "no interface"),
+        ("serial:///dev/ttyNOSUCH:57600", "no such device"),
+    ],
+)
+async def test_an_address_that_is_not_ours_and_a_missing_device_are_said(endpoint, words):
+    with pytest.raises(EndpointError, match=words):
+        async with Link(LinkSettings(endpoint=endpoint)):
             pass
 
 
@@ -226,12 +233,6 @@ async def test_a_full_serial_buffer_never_cuts_a_frame():
         assert len(stamps) == sent
     os.close(theirs)
     os.close(ours)
-
-
-async def test_a_missing_device_is_said():
-    with pytest.raises(EndpointError, match="no such device"):
-        async with Link(LinkSettings(endpoint="serial:///dev/ttyNOSUCH:57600")):
-            pass
 
 
 async def test_a_device_in_use_by_another_program_is_said():
