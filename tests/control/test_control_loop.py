@@ -137,13 +137,6 @@ def test_repeated_and_reordered_samples_are_not_answered(stamp):
     assert bench.loop.record.stale_count == 1
 
 
-def test_a_duplicate_in_the_same_instant_is_not_answered_twice():
-    bench = Bench()
-    bench.run(3)
-    bench.sample()
-    assert len(bench.sent) == 3
-
-
 def test_a_sample_that_was_long_under_way_is_not_answered():
     bench = Bench()
     bench.run(10)

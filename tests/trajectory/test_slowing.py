@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial import cKDTree
 
 from companion.drag import Drag
-from companion.flight.trajectory_notes import overview, slow_down_notes
+from companion.flight.maneuvers import overview, slow_down_notes
 from companion.guidance.trajectory import (
     Envelope,
     Frame,
