@@ -298,19 +298,16 @@ def test_actions_and_steps_are_recorded():
     assert (kept.rows("/target")[-1]["idle"], len(kept.messages["/guidance"])) == (1, 1)
 
 
-def test_it_steps_in_its_period_and_at_once_when_asked():
-    async def run():
-        guidance, steps = Bench().guidance_loop, []
-        guidance.step = lambda: steps.append(1)
-        running = asyncio.create_task(guidance.run())
+async def test_it_steps_in_its_period_and_at_once_when_asked():
+    guidance, steps = Bench().guidance_loop, []
+    guidance.step = lambda: steps.append(1)
+    running = asyncio.create_task(guidance.run())
+    await asyncio.sleep(0)
+    assert len(steps) == 1
+    guidance.step_at_once()
+    for _ in range(5):
         await asyncio.sleep(0)
-        assert len(steps) == 1
-        guidance.step_at_once()
-        for _ in range(5):
-            await asyncio.sleep(0)
-        assert len(steps) == 2
-        await asyncio.sleep(0.1)
-        assert len(steps) >= 3
-        running.cancel()
-
-    asyncio.run(run())
+    assert len(steps) == 2
+    await asyncio.sleep(0.1)
+    assert len(steps) >= 3
+    running.cancel()

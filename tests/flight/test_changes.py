@@ -124,7 +124,7 @@ def test_the_way_of_a_change_is_even_and_null_counts_as_what_it_comes_to():
     assert {each.name for each in differences(before, after)} == {"guidance.position_weight_per_s4"}
 
 
-def test_a_second_change_counts_together_with_one_that_still_takes_effect():
+async def test_a_second_change_counts_together_with_one_that_still_takes_effect():
     """Two changes by 2.5 each are one by 6.25, until the first is in effect."""
 
     class Loops:
@@ -135,17 +135,14 @@ def test_a_second_change_counts_together_with_one_that_still_takes_effect():
         def apply(self, _):
             pass
 
-    async def fly():
-        changes = Changes(Config())
-        with changes.applying(Loops(), lambda _: None, None):
-            changes.change({"planner": {"gain_per_s": 2.0}}, "the page")
-            with pytest.raises(ChangeRefusedError, match=r"from 5 to 0\.8 is more than a factor"):
-                changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
-            assert changes.wanted_config.planner.gain_per_s == 2.0
-            changes.step(asyncio.get_running_loop().time() + SLEW_TIME)
+    changes = Changes(Config())
+    with changes.applying(Loops(), lambda _: None, None):
+        changes.change({"planner": {"gain_per_s": 2.0}}, "the page")
+        with pytest.raises(ChangeRefusedError, match=r"from 5 to 0\.8 is more than a factor"):
             changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
-
-    asyncio.run(fly())
+        assert changes.wanted_config.planner.gain_per_s == 2.0
+        changes.step(asyncio.get_running_loop().time() + SLEW_TIME)
+        changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
 
 
 def test_safety_is_not_changeable():

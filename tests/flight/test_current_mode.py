@@ -115,7 +115,9 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
         (Role.LAND, True, True, False),
     ],
 )
-def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking_over, goes_on):
+async def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(
+    mode, failsafe, taking_over, goes_on
+):
     """After a stall one that waited to be read says what was, and looks new."""
     resumed, answer = [], asyncio.Event()
     loop = SimpleNamespace(
@@ -137,16 +139,13 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
         fresh_heartbeat=answer.wait,
     )
 
-    async def run():
-        watch = Watch(context, None, None, lambda: 0.0)
-        watch.request_mode()
-        await asyncio.sleep(0)
-        watch.check(PHASE)  # the one that waited to be read
-        assert resumed == []
-        state.mode, state.failsafe = mode, failsafe
-        answer.set()
-        await asyncio.sleep(0)
-        await asyncio.sleep(0)
-        assert bool(resumed) is goes_on
-
-    asyncio.run(run())
+    watch = Watch(context, None, None, lambda: 0.0)
+    watch.request_mode()
+    await asyncio.sleep(0)
+    watch.check(PHASE)  # the one that waited to be read
+    assert resumed == []
+    state.mode, state.failsafe = mode, failsafe
+    answer.set()
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    assert bool(resumed) is goes_on

@@ -1,6 +1,5 @@
 """Height has priority: no more tilt is asked for than the thrust holds the height at."""
 
-import asyncio
 from math import cos, radians
 from types import SimpleNamespace
 
@@ -134,7 +133,7 @@ def test_setpoints_that_are_lost_for_a_moment_make_no_vehicle_too_heavy():
 
 
 @pytest.mark.parametrize(("tilt", "told"), [(34.6, 0), (34.4, 1)])
-def test_a_reduction_by_less_than_the_told_degrees_is_not_told(tilt, told):
+async def test_a_reduction_by_less_than_the_told_degrees_is_not_told(tilt, told):
     """It said that the tilt is limited to 35°, although limits.max_tilt_deg is 35."""
     notes = []
     hover = SimpleNamespace(present_hover=0.7)
@@ -146,8 +145,5 @@ def test_a_reduction_by_less_than_the_told_degrees_is_not_told(tilt, told):
         note=notes.append,
     )
 
-    async def check():
-        _TiltMargin(context).check()
-
-    asyncio.run(check())
+    _TiltMargin(context).check()
     assert len(notes) == told, notes

@@ -18,13 +18,3 @@ def pytest_pycollect_makeitem(name, obj):
     """A test that is a coroutine uses `run`."""
     if name.startswith("test_") and inspect.iscoroutinefunction(obj):
         pytest.mark.usefixtures("run")(obj)
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_pyfunc_call(pyfuncitem):
-    """Calls a test that is a coroutine by `run`."""
-    test, values = pyfuncitem.obj, pyfuncitem.funcargs
-    if not inspect.iscoroutinefunction(test):
-        return None
-    values["run"](test(**{name: values[name] for name in inspect.signature(test).parameters}))
-    return True

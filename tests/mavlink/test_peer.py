@@ -164,17 +164,14 @@ async def test_only_the_named_peer_is_heard():
     vehicle.close()
 
 
-def test_a_named_host_fits_in_every_spelling():
-    async def scene():
-        named = await resolve_peers([PeerAddress("127.0.0.1"), PeerAddress("::1", 5)], SOCK_DGRAM)
-        assert named.admits(("::ffff:127.0.0.1", 9, 0, 0))
-        assert named.admits(("::1", 5, 0, 0))
-        assert not named.admits(("::1", 6, 0, 0))
-        assert not named.admits(("127.0.0.2", 9))
-        with pytest.raises(EndpointError, match=r"peer 'no-such-host\.invalid' is unknown"):
-            await resolve_peers([PeerAddress("no-such-host.invalid")], SOCK_DGRAM)
-
-    asyncio.run(scene())
+async def test_a_named_host_fits_in_every_spelling():
+    named = await resolve_peers([PeerAddress("127.0.0.1"), PeerAddress("::1", 5)], SOCK_DGRAM)
+    assert named.admits(("::ffff:127.0.0.1", 9, 0, 0))
+    assert named.admits(("::1", 5, 0, 0))
+    assert not named.admits(("::1", 6, 0, 0))
+    assert not named.admits(("127.0.0.2", 9))
+    with pytest.raises(EndpointError, match=r"peer 'no-such-host\.invalid' is unknown"):
+        await resolve_peers([PeerAddress("no-such-host.invalid")], SOCK_DGRAM)
 
 
 async def test_the_rule_holds_over_ipv6():

@@ -37,44 +37,38 @@ def odometry(resets):
     )
 
 
-def test_who_else_is_there_and_who_steers():
-    async def scene():
-        async with linked() as (link, vehicle):
-            with LinkListener(link, asyncio.get_running_loop().time) as listener:
-                for source, message in (
-                    ((255, 190), of_type(GROUND_STATION)),
-                    ((1, 192), of_type(COMPANION)),
-                    ((1, 193), setpoint()),
-                    ((2, 1), heartbeat()),
-                ):
-                    system, component = source
-                    vehicle.send_raw(frames_of(message, system=system, component=component)[0])
-                await until(lambda: len(listener.other_nodes.sources) == 4)
-            assert listener.other_nodes.autopilots == {(2, 1)}
-            assert listener.other_nodes.companions == {(1, 192)}
-            assert listener.other_nodes.setpoint_senders == {(1, 193)}
-            vehicle.send_raw(frames_of(setpoint(), system=9)[0])
-            await until(lambda: link.stats.ignored_foreign == 5)
-            assert len(listener.other_nodes.sources) == 4  # the listener is off
-
-    asyncio.run(scene())
+async def test_who_else_is_there_and_who_steers():
+    async with linked() as (link, vehicle):
+        with LinkListener(link, asyncio.get_running_loop().time) as listener:
+            for source, message in (
+                ((255, 190), of_type(GROUND_STATION)),
+                ((1, 192), of_type(COMPANION)),
+                ((1, 193), setpoint()),
+                ((2, 1), heartbeat()),
+            ):
+                system, component = source
+                vehicle.send_raw(frames_of(message, system=system, component=component)[0])
+            await until(lambda: len(listener.other_nodes.sources) == 4)
+        assert listener.other_nodes.autopilots == {(2, 1)}
+        assert listener.other_nodes.companions == {(1, 192)}
+        assert listener.other_nodes.setpoint_senders == {(1, 193)}
+        vehicle.send_raw(frames_of(setpoint(), system=9)[0])
+        await until(lambda: link.stats.ignored_foreign == 5)
+        assert len(listener.other_nodes.sources) == 4  # the listener is off
 
 
-def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
-    async def scene():
-        async with linked() as (link, vehicle):
-            with LinkListener(link, asyncio.get_running_loop().time) as listener:
-                vehicle.send(target(0.0), odometry(7))
-                await until(lambda: link.state.reset_counter == 7)
-                assert not listener.other_nodes.has_foreign_attitude_target
-                vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
-                await until(lambda: link.state.reset_counter == 9)
-                assert not listener.other_nodes.has_foreign_attitude_target
-                assert listener.reset_count == 2
-                vehicle.send(heartbeat(), target(0.4), odometry(9))
-                await until(lambda: listener.other_nodes.has_foreign_attitude_target)
-
-    asyncio.run(scene())
+async def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
+    async with linked() as (link, vehicle):
+        with LinkListener(link, asyncio.get_running_loop().time) as listener:
+            vehicle.send(target(0.0), odometry(7))
+            await until(lambda: link.state.reset_counter == 7)
+            assert not listener.other_nodes.has_foreign_attitude_target
+            vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
+            await until(lambda: link.state.reset_counter == 9)
+            assert not listener.other_nodes.has_foreign_attitude_target
+            assert listener.reset_count == 2
+            vehicle.send(heartbeat(), target(0.4), odometry(9))
+            await until(lambda: listener.other_nodes.has_foreign_attitude_target)
 
 
 @pytest.mark.parametrize(
