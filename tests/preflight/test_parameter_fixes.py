@@ -157,7 +157,7 @@ def test_without_an_undo_file_nothing_is_set(tmp_path):
     assert link.values == {"A": 5.0, "B": 2.0, "C": 7.0}
 
 
-async def test_restoring_goes_backwards_and_tells_what_it_cannot(tmp_path):
+def test_restoring_goes_backwards_and_tells_what_it_cannot(tmp_path):
     link = FakeLink(tmp_path, A=5.0, B=2.0, C=7.0)
     path, _, _ = treat(link, tmp_path, [ALL])
     undo, outcomes = load(path, UndoContents), []
@@ -168,8 +168,11 @@ async def test_restoring_goes_backwards_and_tells_what_it_cannot(tmp_path):
     assert not undo.matches_vehicle(link, Identity())
     del link.values["B"]
 
-    link.state.heartbeat.received = asyncio.get_running_loop().time()
-    await restore(link, undo, outcomes.append)
+    async def scene():
+        link.state.heartbeat.received = asyncio.get_running_loop().time()
+        await restore(link, undo, outcomes.append)
+
+    asyncio.run(scene())
     assert [o.change.parameter for o in outcomes] == ["C", "B", "A"]
     assert [bool(o.refusal) for o in outcomes] == [False, True, False]
     assert (link.values["A"], link.values["C"]) == (5.0, 7.0)
