@@ -33,7 +33,7 @@ class MotionEstimate:
     """Passes measurements to the motion observer, on the vehicle's clock; predicts the motion.
 
     Args:
-        offset: returns vehicle time minus event-loop time, s, or None before the first attitude.
+        clock_offset: returns vehicle time minus event-loop time, s; None before the first attitude.
 
     Attributes:
         vertical_thrust: upward part of the commanded specific thrust, m/s².

@@ -79,7 +79,7 @@ class StatusReporter:
     Args:
         ladder: tells which safety monitors have raised an alarm.
         began: when the flight began, s on our clock.
-        phase: returns the running phase, and when it began, s on our clock.
+        current_phase: returns the running phase, and when it began, s on our clock.
         show: called with the state; it must return at once. None: the state is not shown.
         clock: our clock, s.
     """
