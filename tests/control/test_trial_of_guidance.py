@@ -82,7 +82,7 @@ def test_what_does_not_command_finite_numbers_is_refused(made, command):
 
 
 def test_a_time_that_is_no_number_is_refused(made):
-    with pytest.raises(ConfigError, match="acts_after nan s"):
+    with pytest.raises(ConfigError, match=r"`acts_after` must be finite, .* and nan s"):
         made(GOOD, nan)
 
 
