@@ -49,7 +49,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
             "set the battery's capacity or number of cells in the autopilot",
             source,
         )
-    if remaining < min_percent / 100.0:
+    if remaining < config.limits.min_battery:
         return Finding(
             Key.BATTERY,
             UNSAFE,

@@ -218,7 +218,7 @@ def test_the_loop_over_first_order_is_vectorised():
 def test_a_planner_with_memory_is_refused_in_a_sentence():
     planner = make_planner("model-following", lag=0.047, dead_time=0.04)
     level, ahead = [[1.0], [0.0], [0.0], [0.0]], [[0.2], [0.0], [0.0], [0.0]]
-    words = r"without memory \(first-order, .* one planner for each"
+    words = r"without memory, made by make_planner \(first-order, .* one planner for each"
     with pytest.raises(TypeError, match=words):
         batch.rates(planner, level, ahead, DT)
     with pytest.raises(TypeError, match=words):
