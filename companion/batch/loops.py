@@ -1,4 +1,4 @@
-"""The loops over vehicles and samples around a law, in Python or compiled.
+"""The loops over vehicles and samples that call a law, in Python or compiled.
 
 Compiled inner loops are vectorised. To allow that, they run over whole C-contiguous arrays, from 0
 to the end, and do not write to arrays that they read. The law (`apply_law`) and the rotation

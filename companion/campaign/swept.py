@@ -88,7 +88,7 @@ class SweptValues(Section):
         if (self.range is None) != (self.count is None):
             raise ValueError("range and count go together, as in {range: [20, 40], count: 5}")
         if self.within is not None and self.normal is None:
-            raise ValueError("`within` needs `normal`")
+            raise ValueError("`within` limits a normal distribution, so give `normal` too")
         if self.times_base and not self.is_number:
             raise ValueError(
                 "`times_base` multiplies the base value, so the values must be numbers"

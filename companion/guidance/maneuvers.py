@@ -177,7 +177,7 @@ class ManeuverSequence:
             ValueError: the sequence is empty.
         """
         if not self.parts:
-            raise ValueError("a sequence without maneuvers has no part")
+            raise ValueError("the sequence has no maneuvers")
         for maneuver in self.parts[:-1]:
             if time < maneuver.duration:
                 return maneuver, time

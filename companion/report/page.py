@@ -98,7 +98,7 @@ def _page(
     plots: Sequence[Plot],
     settings: Table | None = None,
 ) -> str:
-    words_by_flight = [
+    closing_words_by_flight = [
         (flight.name, closing_words(flight.figures, None))
         for flight in flights
         if flight.figures is not None  # else it is a .tlog
@@ -108,8 +108,10 @@ def _page(
         "page.html.j2",
         title,
         plots,
-        words=words_by_flight[0][1] if len(flights) == len(words_by_flight) == 1 else None,
-        words_by_flight=words_by_flight,
+        words=closing_words_by_flight[0][1]
+        if len(flights) == len(closing_words_by_flight) == 1
+        else None,
+        closing_words_by_flight=closing_words_by_flight,
         flights=flights,
         tables=tables,
         settings=settings,

@@ -193,8 +193,8 @@ class VehicleClock:
         """Whether `stamp` seems ahead only because the link has become quicker.
 
         A quicker link puts `stamp` ahead by at most the delay measured on the slower link.
-        Exchanges after the last sample that fitted the clock do not count, because the clock may
-        have jumped before these exchanges.
+        That delay is from TIMESYNC exchanges up to the last sample that fitted the clock: before
+        later exchanges the clock may have jumped.
         """
         max_delay = self.delay.largest_possible(before=self._last_arrival - SAME_CLOCK_SPREAD)
         return stamp.time > self._newest_time and stamp.apparent_offset - max_offset <= max_delay

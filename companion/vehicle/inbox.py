@@ -125,9 +125,9 @@ class Inbox:
         return True
 
     def needs_timesync_with(self, sender: str) -> bool:
-        """Whether to send frames to `sender`, so that TIMESYNC can prove its signing time stamps.
+        """Whether `sender` must answer a TIMESYNC before its signing time stamps are trusted.
 
-        See `Receiver`.
+        If so, frames are sent to it; see `Receiver`.
         """
         if not self._filter.needs_timesync_answer:
             return False

@@ -22,7 +22,7 @@ SILENCE = {"inject": [{"kind": "stop_telemetry"}], "ends": ["held"]}
         ({"loguniform": [0, 8]}, "loguniform: both values must be above 0"),
         ({"normal": [4, 0]}, "normal: the standard deviation must be above 0"),
         ({"range": [0, 8]}, "range and count go together"),
-        ({"uniform": [0, 8], "within": [1, 2]}, "`within` needs `normal`"),
+        ({"uniform": [0, 8], "within": [1, 2]}, "`within` limits a normal distribution"),
         ({"values": ["a", "b"], "times_base": True}, "`times_base` multiplies the base value"),
     ],
 )

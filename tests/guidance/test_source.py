@@ -39,7 +39,7 @@ def test_maneuvers_count_from_their_beginning():
 
 
 def test_an_empty_sequence_is_not_flown():
-    with pytest.raises(ValueError, match="without maneuvers"):
+    with pytest.raises(ValueError, match="has no maneuvers"):
         ManeuverSequence(()).at(0.0, POSE)
 
 

@@ -216,7 +216,7 @@ def _law_with_pieces(
 
 
 def _largest_of_four(values: Floats, padding: float) -> Floats:
-    """(n + 3,), largest of 4 `values` (n,) for each B-spline coefficient; padded with `padding`."""
+    """(n + 3,), for each B-spline coefficient the largest of the 4 (padded) `values` it affects."""
     padded = np.pad(values, 3, constant_values=padding)
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
 

@@ -148,6 +148,6 @@ def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineH
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     is_moving = speed > max(_SLOW_FRACTION * speed.max(), _STANDING_SPEED)
     if not is_moving.any():
-        raise TrajectoryError("it never moves horizontally, so there is no heading along it")
+        raise TrajectoryError("the curve never moves horizontally, so it has no heading `along`")
     headings = np.unwrap(np.arctan2(velocity[is_moving, 1], velocity[is_moving, 0]))
     return heading_spline(times, np.interp(times, times[is_moving], headings), resting)
