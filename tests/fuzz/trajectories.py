@@ -186,4 +186,4 @@ def _files(draw: Any) -> dict[str, str]:
 
 _cases = st.fixed_dictionaries({"files": _files(), "slow_down": st.booleans()})
 
-TARGET = Target("trajectories", _cases, _check)
+TARGET = Target("trajectories", _cases, _check, seconds=10.0)
