@@ -132,5 +132,8 @@ def apply_rules(
         problem = (
             rule.check(value, finite_values, settings) if isfinite(value) else _NOT_FINITE_PROBLEM
         )
-        findings.append(ParameterFinding(rule, value, *(problem or (CheckResult.SAFE,))))
+        if problem is None:
+            findings.append(ParameterFinding(rule, value, CheckResult.SAFE))
+        else:
+            findings.append(ParameterFinding(rule, value, *problem))
     return findings

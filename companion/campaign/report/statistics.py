@@ -76,8 +76,8 @@ def levels(column: Column) -> list[Group]:
     own. Of texts, the first `_MOST_LEVELS` − 1 are levels, and all others form the last level.
     """
     distinct_keys = sorted({_sort_key(value) for value in column})
-    if column.dtype != float or len(distinct_keys) <= _MOST_LEVELS:
-        all_fit = len(distinct_keys) <= _MOST_LEVELS
+    all_fit = len(distinct_keys) <= _MOST_LEVELS
+    if column.dtype != float or all_fit:
         shown_keys = distinct_keys if all_fit else distinct_keys[: _MOST_LEVELS - 1]
         keys = [_sort_key(value) for value in column]
         groups = [
