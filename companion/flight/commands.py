@@ -1,7 +1,7 @@
 """Commands to a vehicle that a pilot or another station may take over at any moment.
 
-Every command that arms, disarms, takes off or changes the mode goes through `command_if_ours`,
-which first checks who controls the vehicle.
+Every command of a flight that arms, disarms, takes off or changes the mode goes through
+`command_if_ours`, which first checks who controls the vehicle.
 """
 
 import asyncio

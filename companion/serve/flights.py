@@ -4,7 +4,7 @@ import asyncio
 import gc
 
 from companion.flight.commands import disarmed_text, in_role, left_disarmed_text
-from companion.mavlink.errors import LinkError
+from companion.mavlink.errors import CommandTimeout, LinkError
 from companion.serve.fence_across_flights import FenceAcrossFlights
 from companion.serve.ownership import Ownership, Program
 from companion.serve.served_flight import ControlRequest, ServedFlight, ServedVehicle
@@ -13,6 +13,7 @@ from companion.vehicle.autopilot import Role
 
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
+_MAX_HOLD_TRIES = 4
 
 
 class ServedFlights:
@@ -104,14 +105,25 @@ class ServedFlights:
         if self._vehicle.link.state.armed is not False or self.current_flight is not None:
             return
         was_controlled, self._controlled_since_arming = self._controlled_since_arming, False
-        if was_controlled and in_role(self._vehicle.link, Role.OFFBOARD):
+        if was_controlled and self._is_disarmed_in_offboard():
             self._finish_before_close(asyncio.create_task(self._ask_to_hold()))
 
+    def _is_disarmed_in_offboard(self) -> bool:
+        link = self._vehicle.link
+        return link.state.armed is False and in_role(link, Role.OFFBOARD)
+
     async def _ask_to_hold(self) -> None:
+        """Command hold until the autopilot answers; not after another station changed the mode."""
         link, tell = self._vehicle.link, self._vehicle.component.tell
         mode = link.state.mode
         tell(disarmed_text(mode))
-        try:
-            await link.command(*link.autopilot.hold())
-        except LinkError as error:
-            tell(left_disarmed_text(mode, error))
+        for tries_left in reversed(range(_MAX_HOLD_TRIES)):
+            try:
+                await link.command(*link.autopilot.hold(), retries=0)
+                return
+            except LinkError as error:
+                if not self._is_disarmed_in_offboard():
+                    return
+                if tries_left == 0 or not isinstance(error, CommandTimeout):
+                    tell(left_disarmed_text(mode, error))
+                    return

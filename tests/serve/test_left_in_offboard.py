@@ -12,15 +12,7 @@ def test_a_vehicle_that_a_client_has_landed_can_be_armed_again():
     vehicle = mock("px4")
 
     async def scene(session):
-        await airborne(session, vehicle, "px4", 3.0)
-        script = MemoryClient().connect(session)
-        await begin_control(
-            session, script, "px4", lambda _: script.local(POSITION, (0.0, 0.0, -3.0))
-        )
-        script.command(_SET_MODE, 1, _AUTO, _LAND)
-        async with asyncio.timeout(30.0):
-            while vehicle.state()["armed"]:  # noqa: ASYNC110  the truth sets no events
-                await asyncio.sleep(0.5)
+        script = await _landed_by_a_client(session, vehicle)
         await asyncio.sleep(1.5)
         assert vehicle.state()["mode"] == "LOITER", script.texts()
         script.command(_ARM, 1)
@@ -28,3 +20,47 @@ def test_a_vehicle_that_a_client_has_landed_can_be_armed_again():
         assert vehicle.state()["armed"]
 
     served(vehicle, "px4", scene)
+
+
+def test_a_pilot_who_chooses_a_mode_is_not_told_to_hold_again():
+    """The command of hold was lost; sent again, it would end the mode that the pilot chose."""
+    vehicle = mock("px4")
+
+    async def scene(session):
+        script = await _landed_by_a_client(session, vehicle)
+        vehicle.inject({"kind": "drop", "direction": "from_companion"})
+        await asyncio.sleep(1.0)
+        assert vehicle.state()["mode"] == "OFFBOARD"
+        vehicle.take_over("POSCTL")
+        await asyncio.sleep(0.5)
+        vehicle.clear_faults()
+        await asyncio.sleep(5.0)
+        assert vehicle.state()["mode"] == "POSCTL", script.texts()
+
+    served(vehicle, "px4", scene)
+
+
+def test_a_lost_command_of_hold_is_sent_again():
+    vehicle = mock("px4")
+
+    async def scene(session):
+        await _landed_by_a_client(session, vehicle)
+        vehicle.inject({"kind": "drop", "direction": "from_companion"})
+        await asyncio.sleep(1.2)
+        vehicle.clear_faults()
+        await asyncio.sleep(2.0)
+        assert vehicle.state()["mode"] == "LOITER"
+
+    served(vehicle, "px4", scene)
+
+
+async def _landed_by_a_client(session, vehicle):
+    """Fly, land and disarm by a client; return the client."""
+    await airborne(session, vehicle, "px4", 3.0)
+    script = MemoryClient().connect(session)
+    await begin_control(session, script, "px4", lambda _: script.local(POSITION, (0.0, 0.0, -3.0)))
+    script.command(_SET_MODE, 1, _AUTO, _LAND)
+    async with asyncio.timeout(30.0):
+        while vehicle.state()["armed"]:  # noqa: ASYNC110  the truth sets no events
+            await asyncio.sleep(0.02)
+    return script
