@@ -14,6 +14,7 @@ lockstep or on a virtual clock, our clock is the vehicle's, and `epoch` is 0.
 """
 
 import json
+import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -215,5 +216,11 @@ def _not_a_flight_reason(path: Path, error: OSError) -> str:
         return (
             f"{path.parent} holds the folders of flights; name one of them, such as "
             f"{flights[-1].parent}"
+        )
+    logs = sorted(path.parent.glob("*.tlog"))
+    if isinstance(error, FileNotFoundError) and logs:
+        return (
+            f"{path.parent} holds no {RECORD_FILE}, but a MAVLink log; a page about the log alone: "
+            f"companion report {shlex.quote(str(logs[-1]))}"
         )
     return f"{path}: {error.strerror}; is this the folder of a flight?"

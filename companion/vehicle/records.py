@@ -117,11 +117,15 @@ class Battery(NamedTuple):
         Some vehicles send the charge only in SYS_STATUS or only in BATTERY_STATUS. A charge is kept
         for `_MAX_KEPT_CHARGE_AGE`.
         """
-        if newer.remaining is not None:
+        if newer.remaining is not None or self.charge_received is None:
             return newer
-        if self.remaining is None or newer.received - self.received > _MAX_KEPT_CHARGE_AGE:
-            return newer._replace(charge_received=self.charge_received)
-        return self if newer.voltage_v is None else self._replace(voltage_v=newer.voltage_v)
+        is_kept = newer.received - self.charge_received <= _MAX_KEPT_CHARGE_AGE
+        return Battery(
+            newer.received,
+            self.voltage_v if is_kept and newer.voltage_v is None else newer.voltage_v,
+            self.remaining if is_kept else None,
+            self.charge_received,
+        )
 
 
 class AttitudeTargetThrust(NamedTuple):

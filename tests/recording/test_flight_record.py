@@ -169,6 +169,12 @@ def test_a_folder_without_record_is_refused(tmp_path):
         read_flight(tmp_path)
 
 
+def test_a_folder_with_only_a_mavlink_log_is_answered_with_what_reads_the_log(tmp_path):
+    (tmp_path / "2026.tlog").write_bytes(b"")
+    with pytest.raises(RecordError, match=r"companion report .*2026\.tlog$"):
+        read_flight(tmp_path)
+
+
 def write_one(folder, topic, data):
     """A file with one message."""
     file = McapWriter(folder / "flight.mcap")

@@ -253,7 +253,7 @@ def test_a_message_without_the_charge_does_not_hide_the_charge_of_the_other(benc
         for _ in range(4):
             bench.now += 0.25
             battery = bench.take(sys_status(15800, -1)).battery
-            assert battery[:3] == (told, 15.8, charge / 100.0)
+            assert battery == (bench.now, 15.8, charge / 100.0, told)
     bench.now += 1.0
     assert bench.take(sys_status(15700, -1)).battery[:3] == (bench.now, 15.7, None)
 
