@@ -1,5 +1,6 @@
 """Anticipates the correction that the autopilot's estimator will make to its position."""
 
+from collections import deque
 from dataclasses import dataclass
 from math import exp, hypot, sqrt
 
@@ -40,12 +41,14 @@ class CorrectionSettings:
             its positions are smooth, s, positive; at rest twice as long.
         largest_correction: largest anticipated correction, m.
         position_delay: delay of the estimator's position that its corrections do not remove, s.
+        output_delay: time after which a correction of the estimator shows in its position, s.
     """
 
     estimator_time: float
     filter_time: float
     largest_correction: float
     position_delay: float
+    output_delay: float
 
 
 class PositionCorrection:
@@ -55,6 +58,10 @@ class PositionCorrection:
     towards GPS, r = ṗ − v, is the filter's gain times the distance to GPS. So the distance to GPS
     is estimator_time·r. If GPS is later than the filter assumes, the position also lags by
     position_delay·v.
+
+    Both belong to the same past time: the filter processes late measurements, and smooths its
+    output, so r shows the distance to GPS as it was output_delay ago. The sum is still the error of
+    the present position, which has since moved by measured accelerations.
 
     r is computed from two positions a short time apart, which amplifies their noise. Low-pass
     filters reduce the noise but delay the correction, so their time constant follows the noise.
@@ -77,6 +84,7 @@ class PositionCorrection:
         self._correction: NorthEast = (0.0, 0.0)
         self._noise_variance = 0.0
         self._speed_fraction = 0.0
+        self._velocities = _VelocityHistory()
 
     @property
     def trust(self) -> float:
@@ -102,13 +110,16 @@ class PositionCorrection:
         )
         if last_motion is None or not _SHORTEST_GAP < dt < _LONGEST_GAP:
             self._newest_r = self._filtered_r = self._correction = (0.0, 0.0)
+            self._velocities = _VelocityHistory()
         else:
             self._filter_unexplained_velocity(last_motion, measured, dt)
         (north, east, down), velocity = measured
+        self._velocities.add(time, (velocity[0], velocity[1]))
+        past_velocity = self._velocities.at(time - settings.output_delay)
         return VehicleMotion(
             (
-                north + self._correction[0] + settings.position_delay * velocity[0],
-                east + self._correction[1] + settings.position_delay * velocity[1],
+                north + self._correction[0] + settings.position_delay * past_velocity[0],
+                east + self._correction[1] + settings.position_delay * past_velocity[1],
                 down,
             ),
             velocity,
@@ -154,3 +165,20 @@ class PositionCorrection:
         longest = max(shortest, _LONGEST_FILTER_TIME)
         filter_time = min(shortest + _FILTER_TIME_PER_NOISE * sqrt(self._noise_variance), longest)
         return (2.0 - self._speed_fraction) * filter_time
+
+
+class _VelocityHistory:
+    """The newest horizontal velocities, to look up a delayed one."""
+
+    def __init__(self) -> None:
+        self._rows: deque[tuple[float, NorthEast]] = deque()
+
+    def add(self, time: float, velocity: NorthEast) -> None:
+        """Add a velocity, m/s, with a later time than all others, s."""
+        self._rows.append((time, velocity))
+
+    def at(self, time: float) -> NorthEast:
+        """The velocity at `time`, or the oldest one; forgets all earlier ones."""
+        while len(self._rows) > 1 and self._rows[1][0] <= time:
+            self._rows.popleft()
+        return self._rows[0][1]

@@ -1,6 +1,6 @@
 """The correction against an estimator that follows its GPS too slowly, integrated independently."""
 
-from math import cos, hypot, isfinite, sin, sqrt
+from math import cos, hypot, isfinite, pi, sin, sqrt
 from random import Random
 from statistics import mean
 
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.guidance.reference import VehicleMotion
 
-SETTINGS = CorrectionSettings(0.7, 0.1, largest_correction=0.2, position_delay=0.0)
+SETTINGS = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.0, output_delay=0.0)
 DT = 0.02
 RATE = 0.4
 """Of how the estimator's velocity wanders, rad/s."""
@@ -55,14 +55,45 @@ def test_what_the_estimator_has_still_to_correct_is_taken_ahead():
 
 
 def test_a_known_position_delay_is_made_up_for():
-    late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.02)
+    late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.02, output_delay=0.0)
     before, after = errors(late, position_delay=0.02)
     assert before >= 0.12
     assert after <= 0.015
 
 
+@pytest.mark.parametrize("filter_time", [0.04, 0.1])
+@pytest.mark.parametrize("period", [3.0, 6.0])
+def test_in_a_figure_eight_a_late_position_is_made_up_for(filter_time, period):
+    """The filter's position errs by e, ė = −(e + τ·v)/T, and e shows 0.25 s later.
+
+    Taken to be late by τ now, the position of a real ArduPilot was off by twice as much.
+    """
+    estimator_time, position_delay, output_delay, dt = 0.5, 0.02, 0.3, 0.02
+    knowing, unknowing = (
+        PositionCorrection(
+            CorrectionSettings(estimator_time, filter_time, 0.2, position_delay, known_delay)
+        )
+        for known_delay in (output_delay, 0.0)
+    )
+    angular_rate, error, shown = 2.0 * pi / period, 0.0, []
+    off = {knowing: 0.0, unknowing: 0.0}
+    for n in range(round(20.0 / dt)):
+        angle = angular_rate * n * dt
+        north, velocity = 8.0 / angular_rate * sin(angle), 8.0 * cos(angle)
+        shown.append(error)
+        error -= dt * (error + position_delay * velocity) / estimator_time
+        told = north + shown[max(0, n - round(output_delay / dt))]
+        for correction in off:
+            measured = VehicleMotion((told, 0.0, 0.0), (velocity, 0.0, 0.0))
+            found = correction.corrected_motion(n * dt, measured).position_ned[0]
+            if n * dt > 8.0:
+                off[correction] = max(off[correction], abs(found - north))
+    assert off[knowing] <= 0.65 * off[unknowing]
+    assert off[knowing] <= (0.25 if filter_time < 0.05 else 0.4) * position_delay * 8.0
+
+
 def test_other_settings_count_from_the_next_position_on():
-    late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.02)
+    late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.02, output_delay=0.0)
     retuned, kept = PositionCorrection(SETTINGS), PositionCorrection(SETTINGS)
     rows = wandering(6.0)
     for time, _, measured in rows[:200]:
@@ -75,7 +106,7 @@ def test_other_settings_count_from_the_next_position_on():
 
 
 def test_at_rest_nothing_changes():
-    correction = PositionCorrection(CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.05))
+    correction = PositionCorrection(CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.05, output_delay=0.3))
     rest = VehicleMotion((3.0, -2.0, -5.0), (0.0, 0.0, 0.0))
     for n in range(100):
         assert correction.corrected_motion(n * DT, rest) == rest
@@ -94,7 +125,7 @@ def test_a_gap_and_a_reset_begin_anew():
 
 def noisy(metres, speed, seconds=20.0, seed=3):
     """The correction at a speed (m/s), and the errors it adds (m), with white position noise."""
-    quick = CorrectionSettings(0.65, 0.04, largest_correction=0.2, position_delay=0.0)
+    quick = CorrectionSettings(0.5, 0.04, 0.2, position_delay=0.0, output_delay=0.3)
     correction, random, added = PositionCorrection(quick), Random(seed), []
     for n in range(round(seconds / DT)):
         north = speed * n * DT + random.gauss(0.0, metres)
@@ -111,13 +142,13 @@ def test_noise_of_the_positions_lengthens_the_filters():
     assert max(little) <= 2e-3
     rough, added = noisy(0.02, speed=3.0)
     assert rough.trust == 0.0
-    assert max(added[50:]) <= 0.12  # unfiltered: 0.65 s · √2·0.02 m / 0.02 s, about 0.9 m rms
+    assert max(added[50:]) <= 0.12  # unfiltered: 0.5 s · √2·0.02 m / 0.02 s, about 0.7 m rms
 
 
 @pytest.mark.parametrize("slip", [-0.001, 0.001])
 def test_a_stamp_that_slips_by_a_millisecond_hardly_moves_the_position(slip):
     """As on ArduPilot. Unlimited, these 5 mm become a correction of 28 mm."""
-    quick = CorrectionSettings(0.65, 0.04, largest_correction=0.2, position_delay=0.0)
+    quick = CorrectionSettings(0.5, 0.04, 0.2, position_delay=0.0, output_delay=0.3)
     correction, added = PositionCorrection(quick), []
     for n in range(200):
         time = n * DT + (slip if n >= 100 else 0.0)
