@@ -144,7 +144,7 @@ class HoverThrust:
         duration = time - began
         if 0.0 <= duration < SHORTEST_WINDOW:
             return
-        if duration <= _LONGEST_WINDOW and self._thrust_share_count:
+        if 0.0 < duration <= _LONGEST_WINDOW and self._thrust_share_count:
             velocity = 0.5 * (earlier_velocity + velocity_down)
             acceleration = (velocity_down - earlier_velocity) / duration
             measured_thrust = GRAVITY - acceleration - self._settings.drag * velocity
