@@ -22,7 +22,7 @@ _CLAMP_DEVIATIONS = 3.0
 _LARGEST_LINEAR_INCREASE = 2.0
 """Largest excess of the estimated linear drag over the prior's linear drag, 1/s."""
 _LARGEST_QUADRATIC = 0.3
-"""Largest estimate of the quadratic drag, 1/m."""
+"""Largest estimate of the quadratic drag, 1/m, unless the prior's is larger."""
 _AXIS_DRAG_DEVIATION, _LARGEST_AXIS_DRAG = 0.03, 0.1
 """Initial standard deviation of `AxisDrag.coefficient`, which begins at 0, and its largest
 estimate, 1/m."""
@@ -151,7 +151,7 @@ class DragEstimate:
         quadratic drag.
         """
         (linear, quadratic), p = self._state[:2].tolist(), self._covariance
-        clamped = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)
+        clamped = min(max(quadratic, 0.0), max(_LARGEST_QUADRATIC, self.prior_drag.quadratic))
         linear += float(p[0, 1] / p[1, 1]) * (clamped - quadratic) if p[1, 1] > 0.0 else 0.0
         return Drag(
             min(max(linear, 0.0), self.prior_drag.linear + _LARGEST_LINEAR_INCREASE), clamped

@@ -144,13 +144,14 @@ class HoverThrust:
         duration = time - began
         if 0.0 <= duration < SHORTEST_WINDOW:
             return
-        if duration <= _LONGEST_WINDOW and self._thrust_share_count:
+        if 0.0 < duration <= _LONGEST_WINDOW and self._thrust_share_count:
             velocity = 0.5 * (earlier_velocity + velocity_down)
             acceleration = (velocity_down - earlier_velocity) / duration
             measured_thrust = GRAVITY - acceleration - self._settings.drag * velocity
-            if _PLAUSIBLE_THRUST[0] <= measured_thrust <= _PLAUSIBLE_THRUST[1]:
+            mean_share = self._thrust_share_sum / self._thrust_share_count
+            # Upside down the share is negative, and would lead to a negative hover thrust.
+            if mean_share > 0.0 and _PLAUSIBLE_THRUST[0] <= measured_thrust <= _PLAUSIBLE_THRUST[1]:
                 extra_variance = (_DRAG_DEVIATION * velocity) ** 2
-                mean_share = self._thrust_share_sum / self._thrust_share_count
                 self._filter.learn(duration, mean_share, measured_thrust, extra_variance)
         self._begin_window(time, velocity_down)
 

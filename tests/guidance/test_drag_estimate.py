@@ -104,6 +104,11 @@ def test_what_is_told_wrong_is_put_right(configured):
     assert estimate.drag.per_velocity(5.0) == pytest.approx(1.0, abs=0.06)
 
 
+def test_a_large_quadratic_drag_that_was_told_is_not_cut():
+    drags = circled(DragEstimate(told(Drag(0.2, 0.8))), Drag(0.2, 0.8), 2.0, speed=3.0)
+    assert all(drag.per_velocity(3.0) == pytest.approx(2.6, abs=0.2) for drag in drags)
+
+
 def test_it_is_never_negative_nor_beyond_belief():
     pushed = circled(DragEstimate(ANY_VEHICLE), Drag(-2.0), 20.0)
     assert all(drag.linear >= 0.0 and drag.quadratic >= 0.0 for drag in pushed)

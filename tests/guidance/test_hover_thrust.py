@@ -114,6 +114,22 @@ def test_neither_free_fall_nor_garbage_is_ever_learned_from():
     assert thrust.learned_hover == before
 
 
+def test_a_velocity_older_than_the_last_one_is_not_learned_from():
+    thrust = HoverThrust(SETTINGS)
+    for time, velocity in ((10.0, 0.0), (9.7, 1.0)):
+        thrust.note_thrust(0.5, LEVEL)
+        thrust.observe(time, velocity)
+    assert thrust.measured_hover == 0.5
+
+
+def test_an_attitude_upside_down_leads_to_no_negative_hover_thrust():
+    thrust = HoverThrust(SETTINGS)
+    for k in range(100):
+        thrust.note_thrust(1.0, (0.0, 1.0, 0.0, 0.0))
+        thrust.observe(0.02 * k, 0.65 * GRAVITY * 0.02 * k)
+    assert thrust.measured_hover == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize(("sent", "bound"), [(0.95, 0.9), (0.25, 0.5 / 1.8)])
 def test_a_thrust_that_was_never_flown_by_leads_no_further_than_the_limit(sent, bound):
     thrust = HoverThrust(replace(SETTINGS, max_thrust=1.0))

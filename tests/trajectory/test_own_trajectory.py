@@ -58,6 +58,8 @@ class Sway:
 
 
 OURS = [
+    line((5.0, 0.0, 0.0), 1.0, 0.9, 1000.0),  # the acceleration jumps within 1 ms
+    circle(0.8, Laps(speed=0.2, acceleration=50.0)),  # a ramp of 9 ms
     Sway(),
     Hover(3.0),
     Hover(0.0),

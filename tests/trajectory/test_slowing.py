@@ -222,6 +222,11 @@ def test_what_is_too_long_is_slowed_evenly_and_says_so():
     assert "it is too long to be slowed down in parts; its tightest limit is limits." in note
 
 
+def test_what_would_take_longer_than_an_hour_slowed_down_is_refused():
+    with pytest.raises(TrajectoryError, match=r"to keep limits\.max_climb_m_s, it lasts 6414 s"):
+        slow_down(helix(5.0, 31.4, Laps(5.0, 20.0)), Envelope(max_climb=0.1))
+
+
 def test_an_even_slowing_names_the_limit_that_asks_for_most():
     climbing = helix(5.0, 3.0, Laps(5.0, 110.0))
     envelope = Envelope(max_climb=0.1, max_speed=4.5)

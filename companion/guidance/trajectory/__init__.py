@@ -58,7 +58,9 @@ Checked
 from companion.guidance.trajectory.csv_file import Table as Table
 from companion.guidance.trajectory.csv_file import read_csv as read_csv
 from companion.guidance.trajectory.demand import Motion as Motion
+from companion.guidance.trajectory.derived import SlowDown as SlowDown
 from companion.guidance.trajectory.derived import Slowed as Slowed
+from companion.guidance.trajectory.derived import SlowedPart as SlowedPart
 from companion.guidance.trajectory.derived import evenly_slowed as evenly_slowed
 from companion.guidance.trajectory.derived import turned_first as turned_first
 from companion.guidance.trajectory.feasibility import Envelope as Envelope
@@ -87,8 +89,6 @@ from companion.guidance.trajectory.sample import TrajectoryError as TrajectoryEr
 from companion.guidance.trajectory.sample import Vector as Vector
 from companion.guidance.trajectory.sample import computable as computable
 from companion.guidance.trajectory.slower_time import SlowerTime as SlowerTime
-from companion.guidance.trajectory.slowing import SlowDown as SlowDown
-from companion.guidance.trajectory.slowing import SlowedPart as SlowedPart
 from companion.guidance.trajectory.slowing import slow_down as slow_down
 from companion.guidance.trajectory.straight_legs import straight_legs as straight_legs
 from companion.guidance.trajectory.waypoints import waypoints as waypoints

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import inf, remainder, tau
+from typing import NamedTuple
 
 import numpy as np
 
@@ -69,6 +70,39 @@ def evenly_slowed(trajectory: Trajectory, factor: float) -> Slowed:
     if not 0.0 < factor < inf:
         raise TrajectoryError(f"a trajectory is slowed by a positive factor, not {factor:g}")
     return Slowed(trajectory, SlowerTime(trajectory.duration, (factor,) * 4))
+
+
+class SlowedPart(NamedTuple):
+    """A part of a trajectory that is flown more slowly.
+
+    Attributes:
+        begin, end: times in the slowed trajectory, s.
+        factor: the largest factor by which the speed is divided.
+        time: time in the slowed trajectory at which `limit` requires the largest factor, s.
+        limit: configuration key of the limit that requires this factor; empty: unknown.
+    """
+
+    begin: float
+    end: float
+    factor: float
+    time: float
+    limit: str
+
+
+class SlowDown(NamedTuple):
+    """A trajectory within its limits.
+
+    Attributes:
+        trajectory: the trajectory that keeps the limits.
+        parts: the parts that were slowed down, in order; empty if none was.
+        is_even: whether the whole trajectory was slowed down by one factor.
+        reason: why the whole trajectory was slowed down, as the end of a sentence.
+    """
+
+    trajectory: Trajectory
+    parts: tuple[SlowedPart, ...] = ()
+    is_even: bool = False
+    reason: str = ""
 
 
 _REST = (0.0, 0.0, 0.0)

@@ -12,12 +12,17 @@ If slowing down in parts saves hardly any time, the whole trajectory is slowed d
 """
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from companion.guidance.trajectory.demand import Motion, sampled_motion
-from companion.guidance.trajectory.derived import Slowed, evenly_slowed
+from companion.guidance.trajectory.derived import (
+    SlowDown,
+    Slowed,
+    SlowedPart,
+    evenly_slowed,
+)
 from companion.guidance.trajectory.feasibility import Envelope, Violation, broken_limits, excess
 from companion.guidance.trajectory.sample import (
     LONGEST_DURATION,
@@ -61,45 +66,12 @@ _FILL_STEP_FACTOR = 2.0
 """Time between the check times that fill a gap, as a multiple of the median gap."""
 
 
-class SlowedPart(NamedTuple):
-    """A part of a trajectory that is flown more slowly.
-
-    Attributes:
-        begin, end: times in the slowed trajectory, s.
-        factor: the largest factor by which the speed is divided.
-        time: time in the slowed trajectory at which `limit` requires the largest factor, s.
-        limit: configuration key of the limit that requires this factor; empty: unknown.
-    """
-
-    begin: float
-    end: float
-    factor: float
-    time: float
-    limit: str
-
-
-class SlowDown(NamedTuple):
-    """A trajectory within its limits.
-
-    Attributes:
-        trajectory: the trajectory that keeps the limits.
-        parts: the parts that were slowed down, in order; empty if none was.
-        is_even: whether the whole trajectory was slowed down by one factor.
-        reason: why the whole trajectory was slowed down, as the end of a sentence.
-    """
-
-    trajectory: Trajectory
-    parts: tuple[SlowedPart, ...] = ()
-    is_even: bool = False
-    reason: str = ""
-
-
 def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
     """The trajectory unchanged if it keeps all limits, else slowed down until it does.
 
     Raises:
         TrajectoryError: the trajectory breaks a limit at any speed, cannot be computed, or is too
-            long to be checked.
+            long to be checked, as it is or slowed down.
     """
     with computable():
         motion = sampled_motion(trajectory)
@@ -108,17 +80,32 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
             return SlowDown(trajectory)
         part = _slowed_evenly(trajectory, motion, broken, envelope)
         uniform = SlowDown(evenly_slowed(trajectory, part.factor), (part,), is_even=True)
-        times = _denser_times(motion.times)
-        if times.size > _MAX_CHECK_TIMES:
-            return uniform._replace(reason="it is too long to be slowed down in parts")
-        dense_motion = sampled_motion(trajectory, times.tolist())
-        if broken_limits(dense_motion.slowed(part.factor), envelope):
-            return uniform._replace(reason="a finer check found more limits exceeded")
-        law = _best_law(dense_motion, trajectory.duration, envelope)
-        if law is None or law.duration > _WORTHWHILE_FRACTION * uniform.trajectory.duration:
-            return uniform._replace(reason="slowing down in parts would not be quicker")
-        slowed = Slowed(trajectory, law, tuple(times.tolist()))
-        return SlowDown(slowed, tuple(_slowed_parts(dense_motion, law, envelope)))
+        slower = _slowed_in_parts(trajectory, motion, uniform, envelope)
+        if slower.trajectory.duration > LONGEST_DURATION:
+            raise TrajectoryError(
+                f"{trajectory.name}: slowed down to keep {part.limit}, it lasts "
+                f"{slower.trajectory.duration:.4g} s, and {LONGEST_DURATION:.0f} s is the longest; "
+                "make it shorter, or change the limit"
+            )
+        return slower
+
+
+def _slowed_in_parts(
+    trajectory: Trajectory, motion: Motion, uniform: SlowDown, envelope: Envelope
+) -> SlowDown:
+    """The trajectory slowed down in parts, or `uniform` with the reason why not."""
+    times = _denser_times(motion.times)
+    if times.size > _MAX_CHECK_TIMES:
+        return uniform._replace(reason="it is too long to be slowed down in parts")
+    dense_motion = sampled_motion(trajectory, times.tolist())
+    (whole_part,) = uniform.parts
+    if broken_limits(dense_motion.slowed(whole_part.factor), envelope):
+        return uniform._replace(reason="a finer check found more limits exceeded")
+    law = _best_law(dense_motion, trajectory.duration, envelope)
+    if law is None or law.duration > _WORTHWHILE_FRACTION * uniform.trajectory.duration:
+        return uniform._replace(reason="slowing down in parts would not be quicker")
+    slowed = Slowed(trajectory, law, tuple(times.tolist()))
+    return SlowDown(slowed, tuple(_slowed_parts(dense_motion, law, envelope)))
 
 
 def _slowed_evenly(

@@ -3,7 +3,8 @@
 Where the rate of the time law is constant, all laps of a figure are alike. So only the first and
 the last lap are checked; they contain a helix's lowest and highest point. All ramps are checked.
 Neighbouring check times are so close in phase and path length that an extreme between them is
-missed by less than 0.3 %; `tests/trajectory/test_check_times.py` compares them with a finer grid.
+missed by less than 0.3 % (an extreme of the jerk in a ramp shorter than 0.15 s by up to 1.8 %);
+`tests/trajectory/test_check_times.py` compares them with a finer grid.
 """
 
 from bisect import bisect_left, bisect_right
