@@ -83,11 +83,11 @@ def test_in_a_figure_eight_a_late_position_is_made_up_for(filter_time, period):
         shown.append(error)
         error -= dt * (error + position_delay * velocity) / estimator_time
         told = north + shown[max(0, n - round(output_delay / dt))]
-        for correction in off:
-            measured = VehicleMotion((told, 0.0, 0.0), (velocity, 0.0, 0.0))
+        measured = VehicleMotion((told, 0.0, 0.0), (velocity, 0.0, 0.0))
+        for correction, most in off.items():
             found = correction.corrected_motion(n * dt, measured).position_ned[0]
             if n * dt > 8.0:
-                off[correction] = max(off[correction], abs(found - north))
+                off[correction] = max(most, abs(found - north))
     assert off[knowing] <= 0.65 * off[unknowing]
     assert off[knowing] <= (0.25 if filter_time < 0.05 else 0.4) * position_delay * 8.0
 
@@ -106,7 +106,8 @@ def test_other_settings_count_from_the_next_position_on():
 
 
 def test_at_rest_nothing_changes():
-    correction = PositionCorrection(CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.05, output_delay=0.3))
+    late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.05, output_delay=0.3)
+    correction = PositionCorrection(late)
     rest = VehicleMotion((3.0, -2.0, -5.0), (0.0, 0.0, 0.0))
     for n in range(100):
         assert correction.corrected_motion(n * DT, rest) == rest
