@@ -45,8 +45,15 @@ _NOT_MUTATED = [r"^\s*raise \w+\("]
 _NOT_RUN = ["--ignore-glob=*/test_add_a_*.py"]
 """Tests that read the code itself: mutants stand in it beside the functions."""
 
+_PRELOADED = ["casadi", "hypothesis", "numpy", "pydantic", "pymavlink", "pytest", "scipy"]
+"""What each process of a mutant inherits; the program itself it imports anew, as code that runs at
+import is mutated, too."""
+
 _NONE = "companion.none"
 """A pattern that fits no mutant: mutmut makes the mutants and the tests' times, and then fails."""
+
+_TEST_TIMEOUT_S = 60
+"""After this time a test of a mutant waits for what never comes, also on a busy computer."""
 
 _PATIENCE_S = 3.0
 """Added to a test's own time; fifteen times the sum is an endless loop, also on a busy computer."""
@@ -105,9 +112,9 @@ def _prepare(folder: Path, room: str, limit_s: float) -> None:
     print(f"{room}: {len(seconds) - len(slow)} tests; {len(slow)} take over {limit_s:g} s of CPU")
     # Names with ° are escaped anew by each run in one process, and then not found.
     unescaped = "disable_test_id_escaping_and_forfeit_all_rights_to_community_support=true"
-    # Mutants are slow, and mutmut ends an endless loop by itself.
-    arguments = ["-m", "not slow", "-p", "no:cacheprovider", "-o", unescaped, "-o", "timeout=0"]
-    arguments += _NOT_RUN
+    arguments = ["-m", "not slow", "-p", "no:cacheprovider", "-o", unescaped]
+    arguments += ["-o", f"timeout={_TEST_TIMEOUT_S}"]
+    arguments += ["-p", "tests.mutants.hits", *_NOT_RUN]
     arguments += [argument for test in slow for argument in ("--deselect", test)]
     settings = {
         "source_paths": ["companion"],
@@ -119,6 +126,10 @@ def _prepare(folder: Path, room: str, limit_s: float) -> None:
     }
     lines = [f"{key} = {_toml(value)}" for key, value in settings.items()]
     lines.append(f"timeout_constant = {_PATIENCE_S}")
+    (folder / "preloaded.txt").write_text("\n".join(_PRELOADED))
+    lines.append('process_isolation = "forkserver"')
+    lines.append('forkserver_warmup = "import"')
+    lines.append('preload_modules_file = "preloaded.txt"')
     project = (_ROOT / "pyproject.toml").read_text()
     (folder / "pyproject.toml").write_text("\n".join([project, "[tool.mutmut]", *lines, ""]))
 
