@@ -109,14 +109,11 @@ class VehicleClock:
                 return SampleTiming(time, nan, misfit)
             time = time_boot_ms / 1000.0 + self._jump_correction
             offset, max_offset = time - received, self._max_offset
-        lateness = max_offset - offset
-        if lateness < 0.0:
-            max_offset, lateness = offset, 0.0
-        self._max_offset, self._last_arrival = max_offset, received
-        self._newest_time, self._lateness = time, lateness
+        self._max_offset, self._last_arrival = max(max_offset, offset), received
+        self._newest_time, self._lateness = time, self._max_offset - offset
         if received >= self.rate.next_offset_due:
-            self.rate.add_offset(received, max_offset)
-        return SampleTiming(time, lateness + self.delay.seconds)
+            self.rate.add_offset(received, self._max_offset)
+        return SampleTiming(time, self._lateness + self.delay.seconds)
 
     def take_timesync(self, sent: float, received: float, vehicle_ns: int) -> None:
         """Take a TIMESYNC exchange.

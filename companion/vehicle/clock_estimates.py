@@ -119,7 +119,7 @@ class TelemetryDelay:
         self.known = False
         self.seconds = 0.0
         self.why_unknown = DelayUnknown.UNANSWERED
-        self._exchanges: deque[_Exchange] = deque(maxlen=round(EXCHANGE_LIFETIME) + 10)
+        self._exchanges: deque[_Exchange] = deque()
         self._last_implausible: _Exchange | None = None
 
     def take_exchange(self, now: float, error: float, delay: float) -> float | None:
@@ -176,8 +176,7 @@ class TelemetryDelay:
             now: event-loop time, s.
         """
         self._exchanges = deque(
-            (each._replace(delay=each.delay - decrease) for each in self._exchanges),
-            maxlen=self._exchanges.maxlen,
+            each._replace(delay=each.delay - decrease) for each in self._exchanges
         )
         self.expire(now)
 

@@ -96,11 +96,7 @@ def has_wrapped(jump: float, before: float) -> bool:
         jump: how far the clock moved, s.
         before: time since boot before the change, s.
     """
-    return (
-        jump < 0.0
-        and before > _WRAP_PERIOD - _WRAP_TOLERANCE
-        and abs(jump + _WRAP_PERIOD) < _WRAP_TOLERANCE
-    )
+    return before > _WRAP_PERIOD - _WRAP_TOLERANCE and abs(jump + _WRAP_PERIOD) < _WRAP_TOLERANCE
 
 
 def describe_change(jump: float, before: float, after: float, *, set_back: bool) -> str:
