@@ -84,6 +84,13 @@ async def test_silence_is_a_timeout_after_all_tries():
         await link.command(ARM, 1.0)
 
 
+async def test_by_itself_a_command_is_repeated_three_times():
+    async with linked() as (link, vehicle):
+        with pytest.raises(CommandTimeout, match="after 4 tries"):
+            await link.command(ARM, 1.0, timeout_s=0.01)
+        assert len(vehicle.of("COMMAND_LONG")) == 4
+
+
 async def test_in_progress_is_waited_for_and_not_repeated():
     async with linked() as (link, vehicle):
         vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 5)]
@@ -243,6 +250,21 @@ async def test_parameters_of_both_kinds_are_read_and_written():
             held = await link.write_parameter("COM_OBL_RC_ACT", number)
             assert (held, type(held)) == (number, int)
             assert await link.read_parameter("COM_OBL_RC_ACT") == number
+
+
+async def test_parameters_that_another_station_changes_are_told_until_one_leaves():
+    async with linked() as (link, vehicle):
+        parameters, told = ParameterVehicle(vehicle), []
+        leave = link.subscribe_parameters(lambda *value: told.append(value))
+        vehicle.send(*parameters.value("COM_OF_LOSS_T"))
+        await until(lambda: told)
+        parameters.raw["COM_OBL_RC_ACT"] = struct.pack("<i", -5)
+        vehicle.send(*parameters.value("COM_OBL_RC_ACT"))
+        await until(lambda: len(told) == 2)
+        assert told == [("COM_OF_LOSS_T", 1.0), ("COM_OBL_RC_ACT", -5)]
+        leave()
+        assert await link.read_parameter("COM_OF_LOSS_T") == 1.0
+        assert len(told) == 2
 
 
 async def test_a_lost_parameter_request_is_repeated():

@@ -215,6 +215,28 @@ def test_timesync_tells_of_a_restart_before_attitude_is_asked_for_again():
     assert link.ages[-1] < 0.02
 
 
+def test_a_restart_tells_the_time_since_boot_before_and_after_whatever_the_clock_did_before():
+    """A second restart: what the program reckons with goes on, what the vehicle stamps does not."""
+    link = Link(boot=500.0).run(10.0, stall=0.0)
+    for ran, boot in ((510.0, 2.0), (12.0, 5.0)):
+        link.vehicle = boot
+        link.run(10.0, stall=0.0)
+        told = re.search(r"went back from (.*) s to (.*) s: the autopilot", link.told[-1])
+        assert [float(each) for each in told.groups()] == pytest.approx([ran, boot], abs=0.11)
+    assert (link.clock.change_count, link.clock.restart_count) == (2, 2)
+
+
+def test_before_the_first_sample_no_age_is_known_and_no_stamp_is_ahead():
+    clock = VehicleClock()
+    assert (clock.offset, clock.age(5.0, 10.0)) == (None, None)
+    assert not clock.is_ahead(1e6, 10.0)
+    clock.take_timesync(10.0, 10.004, 5_000_000_000)  # nothing to compare it with
+    assert not clock.age_known
+    clock.take(5000, 10.0)
+    assert (clock.offset, clock.age(4.0, 10.0)) == (-5.0, 1.0)
+    assert clock.age(6.0, 10.0) == 0.0  # never negative
+
+
 def test_delay_from_the_start_counts_where_timesync_tells_it():
     link = Link(delay=0.4).run(2.0)
     assert link.ages[-1] == pytest.approx(0.4, abs=0.01)

@@ -37,6 +37,30 @@ def test_two_exchanges_ahead_are_a_clock_that_jumped_once_the_delay_was_known():
     assert (delay.known, delay.why_unknown) == (False, DelayUnknown.OTHER_CLOCK)
 
 
+@pytest.mark.parametrize(
+    ("second", "agree"), [(900.059, True), (899.941, True), (900.061, False), (899.939, False)]
+)
+def test_two_implausible_delays_agree_within_their_errors_and_timesyncs_lag(second, agree):
+    delay, _ = compared((1.0, 0.005, 0.02), (2.0, 0.005, 900.0), (3.0, 0.005, second))
+    assert delay.known is not agree
+
+
+def test_an_implausible_delay_counts_only_beside_another_one_just_before():
+    delay, _ = compared((1.0, 0.005, 900.0), (2.0, 0.005, 0.02), (3.0, 0.005, 900.0))
+    assert (delay.known, delay.seconds) == (True, 0.02)
+    delay.take_exchange(4.0, 0.005, 900.0)
+    assert not delay.known
+
+
+def test_a_quicker_sample_shortens_the_delay_of_every_exchange():
+    delay, _ = compared((1.0, 0.005, 0.08), (2.0, 0.004, 0.09))
+    delay.shorten(0.05, 2.5)
+    assert delay.seconds == pytest.approx(0.04)  # of the newer one, which is surer
+    assert delay.largest_possible(before=1.0) == pytest.approx(0.035)
+    delay.shorten(0.05, 2.5)
+    assert delay.seconds == 0.0  # never negative
+
+
 def test_the_largest_delay_counts_exchanges_until_then_with_their_errors():
     delay, _ = compared((1.0, 0.005, 0.02), (2.0, 0.004, 0.01))
     assert delay.largest_possible(before=0.9) == 0.0

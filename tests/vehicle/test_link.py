@@ -121,6 +121,7 @@ async def test_a_failing_tap_does_not_end_the_link():
         vehicle = await FakeVehicle(link.local_address).open_udp()
         vehicle.send(heartbeat(), heartbeat())
         await until(lambda: len(errors) >= 2)
+        assert {str(error) for error in errors} == {"disk full"}
         vehicle.close()
 
 
@@ -234,6 +235,29 @@ async def test_no_vehicle_is_said_clearly():
         with pytest.raises(LinkTimeout, match="target_system right"):
             await link.wait_connected(0.1)
         other.close()
+
+
+async def test_heartbeats_of_another_part_do_not_prolong_the_wait_for_the_autopilots():
+    async def chatter(gimbal):
+        while True:
+            gimbal.send(heartbeat(autopilot=8))
+            await asyncio.sleep(0.02)
+
+    async with Link(LinkSettings(endpoint="udpin://127.0.0.1:0")) as link:
+        gimbal = await FakeVehicle(link.local_address).open_udp()
+        chattering = asyncio.create_task(chatter(gimbal))
+        async with asyncio.timeout(5.0):
+            with pytest.raises(LinkTimeout):
+                await link.wait_connected(0.1)
+        chattering.cancel()
+        gimbal.close()
+
+
+async def test_a_position_is_known_with_the_stamp_of_the_vehicles_clock():
+    async with linked() as (link, vehicle):
+        vehicle.send(dialect.MAVLink_local_position_ned_message(2500, 1, 2, -3, 0, 0, 0))
+        await until(lambda: link.state.position)
+        assert link.state.position.vehicle_time == 2.5
 
 
 async def test_an_autopilot_we_do_not_know_is_refused():
