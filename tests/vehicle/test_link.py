@@ -125,6 +125,15 @@ async def test_a_failing_tap_does_not_end_the_link():
         vehicle.close()
 
 
+async def test_a_task_of_the_link_that_fails_is_reported(monkeypatch):
+    async with linked(heartbeat_rate_hz=100.0) as (link, _):
+        errors = []
+        link.on_error = errors.append
+        monkeypatch.setattr(link._outbox, "send_heartbeat", lambda: 1 / 0)
+        await until(lambda: errors)
+        assert [type(error) for error in errors] == [ZeroDivisionError]
+
+
 async def test_only_the_configured_system_and_component_are_heard():
     async with linked() as (link, vehicle):
         samples = []

@@ -64,6 +64,13 @@ def test_of_several_checks_the_first_that_finds_something_speaks():
     assert problem(both, 6.0) == Problem(BAD, WORSE, 1.5)
 
 
+def test_each_of_several_checks_knows_the_other_parameters_and_our_settings():
+    given = []
+    both = checks.first_problem(*[lambda *arguments: given.append(arguments)] * 2)
+    assert both(3.0, {"OTHER": 2.0}, SETTINGS) is None
+    assert given == [(3.0, {"OTHER": 2.0}, SETTINGS)] * 2
+
+
 @pytest.mark.parametrize(
     ("value", "words", "set_to"),
     [
