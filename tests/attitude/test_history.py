@@ -2,7 +2,7 @@
 
 import pytest
 
-from companion.attitude.history import PlannedTilt, PlannedYaw, PlanSeries
+from companion.attitude.history import PlannedTilt, PlannedYaw, PlanSeries, SampleHold
 
 MOTION = PlannedYaw(-1.0, 4.0, 0.5)
 
@@ -42,3 +42,20 @@ def test_starting_again_forgets():
     past.add(0.01, PlannedYaw(*[9.0] * 3))
     past.start(0.0, PlannedYaw(*[1.0] * 3), PlannedYaw(*[0.0] * 3))
     assert past.at(-0.07) == past.at(0.0) == past.at(0.01) == PlannedYaw(*[1.0] * 3)
+
+
+@pytest.mark.parametrize("dt", [0.004, 0.01, 0.012, 0.019, 0.05])
+def test_what_was_turned_wrong_until_a_sample_came_is_made_up_by_the_next_rates(dt):
+    """Too late or too early by at most a period: the old rates were held, and not the planned."""
+    hold = SampleHold()
+    hold.note_sample(0.01)
+    assert hold.rates(1.0, -2.0) == (1.0, -2.0)
+    hold.note_sample(dt)
+    late = dt - 0.01
+    assert hold.lateness == pytest.approx(late)
+    assert hold.period == pytest.approx(0.01 + 0.05 * min(late, 0.01))
+    assert hold.plan_dt == pytest.approx(hold.period + late)
+    roll, pitch = hold.rates(3.0, 5.0)
+    counted = min(late, hold.period)
+    assert hold.period * (roll - 3.0) == pytest.approx(counted * (3.0 - 1.0))
+    assert hold.period * (pitch - 5.0) == pytest.approx(counted * (5.0 - -2.0))
