@@ -1,6 +1,7 @@
 """The way to a planner and into it: names, options, limits, and what a call takes and refuses."""
 
 import math
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -18,6 +19,7 @@ from companion.attitude import (
     attitude,
     make_planner,
 )
+from companion.attitude.first_order import first_order
 from companion.attitude.limits import make_constants
 from companion.attitude.representation import limited_target
 
@@ -284,6 +286,11 @@ def test_a_class_without_a_method_of_a_planner_is_refused():
 
     with pytest.raises(TypeError, match=r"Halfway is no planner: it has no method reset\(\)"):
         make_planner(Halfway)
+
+
+def test_a_law_without_a_name_is_named_as_python_shows_it():
+    with pytest.raises(TypeError, match=r"functools.partial\(.*\)' does not take the option 'lag'"):
+        make_planner(partial(first_order), lag=0.05)
 
 
 def test_an_option_of_another_planner_is_named_with_the_planner():

@@ -362,6 +362,11 @@ def test_a_slip_of_the_clock_makes_samples_old_for_seconds_at_most(slip, seen):
     assert (link.misfits, link.clock.change_count) == ([], 0)
 
 
+def test_in_lockstep_the_age_of_the_first_sample_is_known():
+    assert VehicleClock(lockstep=True).take(4000, 4.3).age == pytest.approx(0.3)
+    assert VehicleClock().take(4000, 4.3).age == 0.0
+
+
 def test_in_lockstep_there_is_one_clock_and_timesync_is_not_needed():
     clock = VehicleClock(lockstep=True)
     told = []
