@@ -156,6 +156,7 @@ def _held_motion(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> _HeldMotion:
     feedback_rate = min(_FEEDBACK_RATE, failsafe.max_tilt_rate)
     displacement, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     feedback_displacement = feedback_speed = greatest_height = 0.0
+    slowing = 1.0 + failsafe.drag.linear * step  # backward Euler, as in `_after_drag`
     for index in range(_INTEGRATION_STEPS):
         angle = rotation_rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), direction, sin(angle))
@@ -167,7 +168,7 @@ def _held_motion(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> _HeldMotion:
         # The acceleration by a thrust axis that feedback has turned by this angle.
         feedback_angle = min(pi, feedback_rate * (index + 0.5) * step)
         acceleration = 2.0 * specific_thrust * sin(0.5 * feedback_angle)
-        feedback_speed = (feedback_speed + acceleration * step) / (1.0 + failsafe.drag.linear * step)
+        feedback_speed = (feedback_speed + acceleration * step) / slowing
         feedback_displacement += feedback_speed * step
         greatest_height = max(greatest_height, -displacement[2])
     tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback_rate * duration
