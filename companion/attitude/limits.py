@@ -5,7 +5,7 @@ from math import cos, inf, isfinite, pi, radians, sin
 from typing import Literal, NamedTuple
 
 _SMALLEST_LIMIT = 1e-6
-"""Smallest limit that is accepted, rad or rad/s."""
+"""Smallest limit that is accepted, rad or rad/s; and smallest gain, 1/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +122,8 @@ def make_constants(
     """
     if not isinstance(limits, Limits):
         raise TypeError(f"limits must be a companion.attitude.Limits, not {limits!r}")
-    if not 0.0 < gain < inf:
-        raise ValueError(f"gain must be positive and finite, not {gain}")
+    if not _SMALLEST_LIMIT <= gain < inf:
+        raise ValueError(f"gain must be at least {_SMALLEST_LIMIT:g} 1/s and finite, not {gain}")
     if not 0.0 <= yaw_gain < inf:
         raise ValueError(f"yaw_gain must be finite and not negative, not {yaw_gain}")
     if not 0.0 < recovery_angle <= radians(80.0):

@@ -5,6 +5,8 @@ from math import atan2, hypot, inf, pi, sqrt
 
 _LONGEST_LAG_OR_DEAD_TIME = 1.0
 """Longest lag, dead time or lead that is accepted, s."""
+_SMALLEST_LIMIT = 1e-6
+"""Smallest slew limit, rad/s², and smallest damping that are accepted."""
 _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
 
@@ -52,8 +54,8 @@ class RateLoopResponse:
             applies body rates along the axes of that target. None: `lead_time` estimates it.
 
     Raises:
-        ValueError: a time is negative, longer than 1 s or NaN, or a slew limit or damping is not
-            positive.
+        ValueError: a time is negative, longer than 1 s or NaN, or a slew limit or damping is below
+            1e-6.
     """
 
     roll: AxisResponse = AxisResponse()
@@ -68,8 +70,8 @@ class RateLoopResponse:
         for prefix, axis in axes.items():
             _check_time(f"{prefix}lag", axis.lag)
             _check_time(f"{prefix}dead_time", axis.dead_time)
-            _check_positive(f"{prefix}acceleration", axis.acceleration)
-            _check_positive(f"{prefix}damping", axis.damping)
+            _check_large_enough(f"{prefix}acceleration", axis.acceleration)
+            _check_large_enough(f"{prefix}damping", axis.damping)
 
     @property
     def lead_time(self) -> float:
@@ -102,9 +104,9 @@ def _check_time(name: str, value: float) -> None:
         raise ValueError(f"{name} must be from 0 to {_LONGEST_LAG_OR_DEAD_TIME:g} s, not {value}")
 
 
-def _check_positive(name: str, value: float) -> None:
-    if not value > 0.0:
-        raise ValueError(f"{name} must be positive, not {value}")
+def _check_large_enough(name: str, value: float) -> None:
+    if not value >= _SMALLEST_LIMIT:
+        raise ValueError(f"{name} must be at least {_SMALLEST_LIMIT:g}, not {value}")
 
 
 def largest_gain(lag: float, dead_time: float, sigma: float = 0.0) -> float:

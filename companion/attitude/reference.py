@@ -87,7 +87,9 @@ class SecondOrderReference:
             odd_part = decay_factor * sin(root * dt) / root
         elif root_squared < 0.0:
             root = sqrt(-root_squared)
-            slow_decay = exp((root - decay_rate) * dt)  # the slower exponential cannot overflow
+            # The slower exponential cannot overflow. Its rate is decay_rate − root, written without
+            # this difference, which is all rounding error for a large damping.
+            slow_decay = exp(-self.frequency * self.frequency / (decay_rate + root) * dt)
             even_part = 0.5 * slow_decay * (1.0 + exp(-2.0 * root * dt))
             odd_part = -0.5 * slow_decay * expm1(-2.0 * root * dt) / root
         else:

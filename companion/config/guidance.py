@@ -39,7 +39,7 @@ class PlannerConfig(Section):
     response stays linear; needs `vehicle`. quaternion, so3, euler: the paper's comparison laws. A
     planner of another package is named by its entry point in `companion.planners`.
     """
-    gain_per_s: Annotated[float, Field(gt=0.0, le=20.0, json_schema_extra=TUNABLE)] = 5.0
+    gain_per_s: Annotated[float, Field(ge=0.1, le=20.0, json_schema_extra=TUNABLE)] = 5.0
     """Gain p: the acceleration approaches its target with the time constant 1/p."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 2.0
     """Gain of the heading: it approaches its target with the time constant 1/yaw_gain_per_s.

@@ -11,7 +11,7 @@ from companion.files.yaml_file import Section
 
 Milliseconds = Annotated[float, Field(ge=0.0, le=1000.0)]
 Damping = Annotated[float, Field(ge=0.3, le=10.0)]
-AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
+AccelerationLimit = Annotated[float, Field(ge=10.0, le=100_000.0)]
 
 
 class AxisKeys(NamedTuple):

@@ -45,17 +45,9 @@ def make_guidance(config: Config) -> Guidance:
     """Linear guidance, or the guidance of another package that `guidance.kind` names.
 
     Raises:
-        ConfigError: the guidance of another package cannot be loaded or made, or fails a trial; or
-            the gains of the position hold cannot be computed.
+        ConfigError: the guidance of another package cannot be loaded or made, or fails a trial.
     """
-    kind = config.guidance.kind
-    try:
-        settings = linear_settings(config)
-    except ValueError as error:
-        raise ConfigError(
-            f"planner.gain_per_s {config.planner.gain_per_s:g} is too small to compute the gains "
-            "of the position hold; raise it"
-        ) from error
+    kind, settings = config.guidance.kind, linear_settings(config)
     if kind in GUIDANCE_NAMES:
         return LinearGuidance(settings)
     factory = plugin("guidance.kind", plugins.GUIDANCE, kind)

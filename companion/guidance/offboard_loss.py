@@ -25,6 +25,8 @@ _LEVELLING_RATE = 3.0
 """Rate at which the autopilot levels the vehicle, rad/s (PX4's limit: 3.8)."""
 _VERTICAL_BRAKING = 4.0
 """Deceleration with which the autopilot ends a climb or a fall, m/s² (PX4: MPC_ACC_UP_MAX)."""
+_SMALLEST_THRUST = 1e-6
+"""Lower bound of the specific thrust whose axis turns, m/s²."""
 _SMALLEST_DRAG = 0.2
 """Linear drag that any multirotor is assumed to have at least, 1/s; the smallest measured one is
 0.25. Drag alone stops the drift of a level vehicle."""
@@ -139,7 +141,8 @@ def _held_motion(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> _HeldMotion:
     """Integrate the motion while the autopilot holds rates and thrust."""
     duration = failsafe.hold_time + _FAILSAFE_DELAY
     step = duration / _INTEGRATION_STEPS
-    specific_thrust = hypot(*at_loss.thrust)
+    # Without thrust there is no axis that could turn, and a turn has no effect.
+    specific_thrust = max(hypot(*at_loss.thrust), _SMALLEST_THRUST)
     axis = _scaled(at_loss.thrust, 1.0 / specific_thrust)
     axial = sum(a * b for a, b in zip(axis, at_loss.thrust_rate, strict=True))
     lateral = _plus_scaled(at_loss.thrust_rate, axis, -axial)
@@ -153,6 +156,7 @@ def _held_motion(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> _HeldMotion:
     feedback_rate = min(_FEEDBACK_RATE, failsafe.max_tilt_rate)
     displacement, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     feedback_displacement = feedback_speed = greatest_height = 0.0
+    slowing = 1.0 + failsafe.drag.linear * step  # backward Euler, as in `_after_drag`
     for index in range(_INTEGRATION_STEPS):
         angle = rotation_rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), direction, sin(angle))
@@ -164,7 +168,7 @@ def _held_motion(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> _HeldMotion:
         # The acceleration by a thrust axis that feedback has turned by this angle.
         feedback_angle = min(pi, feedback_rate * (index + 0.5) * step)
         acceleration = 2.0 * specific_thrust * sin(0.5 * feedback_angle)
-        feedback_speed += (acceleration - failsafe.drag.linear * feedback_speed) * step
+        feedback_speed = (feedback_speed + acceleration * step) / slowing
         feedback_displacement += feedback_speed * step
         greatest_height = max(greatest_height, -displacement[2])
     tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback_rate * duration
@@ -220,10 +224,12 @@ def _plus_scaled(a: Vector, b: Vector, factor: float) -> Vector:
 def _after_drag(velocity: Vector, drag: Drag, duration: float) -> Vector:
     """Velocity after `duration` s of horizontal drag, m/s NED.
 
-    Vertical drag is left out: without it a fall is longest, which is the worst case.
+    Backward Euler, so that drag never reverses the motion, however long `duration` is. Vertical
+    drag is left out: without it a fall is longest, which is the worst case.
     """
-    north, east, _ = drag.deceleration((velocity[0], velocity[1], 0.0))
-    return velocity[0] - north * duration, velocity[1] - east * duration, velocity[2]
+    north, east, down = velocity
+    share = 1.0 / (1.0 + drag.per_velocity(hypot(north, east)) * duration)
+    return share * north, share * east, down
 
 
 def path_thrust(acceleration: Vector, velocity: Vector, drag: Drag) -> Vector:

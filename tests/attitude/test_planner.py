@@ -42,6 +42,7 @@ def test_unknown_planner_names_the_known_ones():
     ("options", "words"),
     [
         ({"gain": 0.0}, "gain"),
+        ({"gain": 1e-300}, "gain"),
         ({"gain": math.nan}, "gain"),
         ({"gain": math.inf}, "gain"),
         ({"yaw_gain": -1.0}, "yaw_gain"),

@@ -74,6 +74,12 @@ def test_an_overdamped_model_a_long_time_later():
     assert [*c, *speed] == pytest.approx([*expected_c, *expected_speed], abs=1e-9)
 
 
+def test_a_large_damping_leaves_the_slow_pole_exact():
+    """As with a tiny gain and a short lag of second order; 2ζ/ω is 250 000 s."""
+    from_c, _, _, _ = SecondOrderReference(2e4, 2.5e9).transition(0.05)
+    assert 1.0 - from_c == pytest.approx(0.05 / 250_000.0, rel=1e-6)
+
+
 @pytest.mark.parametrize("max_speed", [np.inf, 2.0, 0.4])
 @pytest.mark.parametrize("dt", [1e-3, 0.05, 0.6])
 def test_first_order_is_the_integral_of_its_slope(max_speed, dt):

@@ -1,6 +1,6 @@
 """How far the last rates carry a vehicle: by hand where that can be, and its limits."""
 
-from math import cos, hypot, pi, sin
+from math import cos, hypot, inf, pi, sin
 
 import pytest
 
@@ -106,6 +106,17 @@ def test_upside_down_it_falls_for_as_long_as_it_takes_to_level():
     fallen = 0.5 * GRAVITY * (1.0 - cos(1.5)) * 1.0
     assert there.max_fall > fallen
     assert reach(fast, PX4._replace(max_tilt_rate=1.5)).max_fall < 0.5 * there.max_fall
+
+
+@pytest.mark.parametrize("thrust", [LEVEL, NOTHING])
+@pytest.mark.parametrize("drag", [Drag(10.0), Drag(1.0, 1.0)])
+def test_however_strong_the_drag_and_long_the_hold_it_only_slows(drag, thrust):
+    """A step of the integration is longer than the drag's time constant; thrust may be nothing."""
+    failsafe = ARDUPILOT._replace(hold_time=10.0, drag=drag)
+    there = reach(flown(velocity=(20.0, 0.0, 0.0), thrust=thrust, turn=(0.0, 0.0, 1.0)), failsafe)
+    assert 0.0 < there.place[0] < 20.0 * 10.1
+    assert 0.0 <= there.stop_radius < inf
+    assert 0.0 <= there.max_fall < 3000.0  # it falls without thrust for 12 s
 
 
 def test_drag_is_part_of_the_thrust_that_a_path_takes():

@@ -1,6 +1,6 @@
 """Figures and lines: derivatives, ends, form, speeds and headings."""
 
-from math import atan2, hypot, pi, tau
+from math import atan2, hypot, inf, pi, tau
 
 import numpy as np
 import pytest
@@ -185,6 +185,7 @@ def test_hover_stays():
         (lambda: line((0.0, 0.0, 0.0), 1.0, 1.0, 1.0), "end at another point"),
         (lambda: line((0.0, 0.0, 1.0), 1.0, 1.0, 1.0, face_path=True), "vertical line"),
         (lambda: line((1.0, 0.0, 0.0), 1.0, 0.0, 1.0), "must be positive"),
+        (lambda: line((1.0, 0.0, 0.0), 1.0, 1.0, inf), "positive and finite"),
         (lambda: circle(0.0, Laps(1.0)), "size, speed, laps and acceleration of a circle"),
         (lambda: helix(1.0, 1.0, Laps(1.0, 0.0)), "of a helix must be positive"),
         (lambda: gerono_eight(1.0, Laps(1.0, 1.5)), "laps of a figure-eight must be whole"),

@@ -3,7 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, pi, sin, sqrt
+from math import cos, inf, pi, sin, sqrt
 from typing import Any, NamedTuple, Protocol
 
 from companion.guidance.trajectory.sample import TrajectoryError
@@ -182,10 +182,12 @@ class LimitedJerk:
             jerk: largest jerk, m/s³.
 
         Raises:
-            TrajectoryError: a value is not positive.
+            TrajectoryError: a value is not positive and finite.
         """
-        if not all(value > 0.0 for value in (length, speed, acceleration, jerk)):  # nor NaN
-            raise TrajectoryError("length, speed, acceleration and jerk of a line must be positive")
+        if not all(0.0 < value < inf for value in (length, speed, acceleration, jerk)):
+            raise TrajectoryError(
+                "length, speed, acceleration and jerk of a line must be positive and finite"
+            )
         jerk_time = min(acceleration / jerk, sqrt(speed / jerk))
         ramp = jerk_time + speed / (jerk * jerk_time)
         cruise_time = length / speed - ramp
