@@ -3,7 +3,8 @@
 import asyncio
 import gc
 
-from companion.flight.commands import disarmed_text, in_role, left_disarmed_text
+from companion.flight.commands import in_role
+from companion.flight.leave_offboard import disarmed_text, left_disarmed_text
 from companion.mavlink.errors import CommandTimeout, LinkError
 from companion.serve.fence_across_flights import FenceAcrossFlights
 from companion.serve.ownership import Ownership, Program
@@ -100,7 +101,7 @@ class ServedFlights:
         """Ask a vehicle that a client has landed to hold, if it could not be armed again.
 
         PX4 returns to OFFBOARD, because this program chose that mode; see
-        `companion.flight.commands.leave_offboard`.
+        `companion.flight.leave_offboard`.
         """
         if self._vehicle.link.state.armed is not False or self.current_flight is not None:
             return
