@@ -5,12 +5,14 @@ Every command of a flight that arms, disarms, takes off or changes the mode goes
 """
 
 import asyncio
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterator, Set
+from contextlib import contextmanager, suppress
 
 from companion.flight.context import FlightContext
 from companion.mavlink.commands import Command, command_name
 from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
 from companion.safety.actions import ControlReleased, Exit, FlightEnded
+from companion.safety.autopilot_breaches import DISARMED_IN_FLIGHT
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
 
@@ -23,7 +25,6 @@ _MODE_REPORT_TIMEOUT = 1.0
 _REASON_TEXT_DELAY = 0.3
 """Largest time between a mode change and the STATUSTEXT that gives the reason, s."""
 _FAILSAFE_TEXT = "the autopilot's failsafe took over"
-_OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
 IsDone = Callable[[], bool]
 """Returns whether the vehicle has obeyed the command; may raise `FlightEnded` instead."""
@@ -64,13 +65,26 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
         raise ControlReleased(f"{released_by} commanded mode {link.state.mode}", Exit.RELEASE)
     if link.state.mode_by_failsafe:
         raise FlightEnded(f"{_FAILSAFE_TEXT}: mode {link.state.mode}", Exit.RELEASE)
-    raise ModeTakenOver(
-        f"the pilot or another station took over: mode {link.state.mode}", Exit.RELEASE
-    )
+    raise _taken_over(link)
+
+
+def require_armed_in_air(context: FlightContext) -> None:
+    """End the flight if the vehicle was disarmed in the air, in a phase without safety monitors.
+
+    Raises:
+        FlightEnded: the vehicle is disarmed, and has not been on the ground all the time.
+    """
+    if context.link.state.armed is False and not context.ground.standing:
+        raise FlightEnded(DISARMED_IN_FLIGHT, Exit.RELEASE)
 
 
 class ModeTakenOver(FlightEnded):
     """The vehicle is in a mode that is not ours, and the autopilot reports no failsafe."""
+
+
+def _taken_over(link: Link) -> ModeTakenOver:
+    text = f"the pilot or another station took over: mode {link.state.mode}"
+    return ModeTakenOver(text, Exit.RELEASE)
 
 
 async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
@@ -98,10 +112,10 @@ async def command_if_ours(
     """Send a command until the autopilot answers; before each try, check who has control.
 
     A command is never repeated blindly. The vehicle may have obeyed a command whose answer was
-    lost, and a pilot may have taken over since.
+    lost, and a pilot may have taken over since, even by a mode in which we may command.
 
     `require_control`: called before each try; if it raises, nothing is sent. `done`: see `IsDone`;
-    called before a repetition.
+    called before a repetition, and at each report of the mode.
 
     Raises:
         FlightEnded: somebody else has the vehicle, or another vehicle answers.
@@ -110,31 +124,65 @@ async def command_if_ours(
         CommandUnfinished: the autopilot answered "in progress", and did not finish in time.
         LinkLost: the connection dropped while waiting.
     """
-    for attempt in range(_MAX_TRIES):
-        await context.fresh_heartbeat()
-        context.replacement_detector.require()
-        if attempt > 0 and done():
-            return
-        require_control()
-        try:
-            await context.link.command(*command, retries=0)
-            return
-        except CommandUnfinished:  # another try would only take as long again
+    with _watching(context, done) as require_not_undone:
+        for attempt in range(_MAX_TRIES):
             await context.fresh_heartbeat()
-            if not done():
-                raise
+            context.replacement_detector.require()
+            if attempt > 0 and done():
+                return
+            require_control()
+            require_not_undone()
+            try:
+                await context.link.command(*command, retries=0)
+                return
+            except CommandUnfinished:  # another try would only take as long again
+                await context.fresh_heartbeat()
+                if not done():
+                    raise
+                return
+            except CommandTimeout:
+                pass
+            except CommandRefused:
+                # A vehicle that has obeyed the first try refuses the second one.
+                if attempt == 0 or not await _takes_effect(context, done):
+                    raise
+                return
+        await context.fresh_heartbeat()
+        if done():
             return
-        except CommandTimeout:
-            pass
-        except CommandRefused:
-            # A vehicle that has obeyed the first try refuses the second one.
-            if attempt == 0 or not await _takes_effect(context, done):
-                raise
-            return
-    await context.fresh_heartbeat()
-    if not done():
-        name = command_name(command.command)
-        raise CommandTimeout(f"{name}: no answer to {_MAX_TRIES} tries; does the uplink work?")
+        require_not_undone()
+    name = command_name(command.command)
+    raise CommandTimeout(f"{name}: no answer to {_MAX_TRIES} tries; does the uplink work?")
+
+
+@contextmanager
+def _watching(context: FlightContext, done: IsDone) -> Iterator[Callable[[], None]]:
+    """Watch for the effect of a command, so that it is not repeated after others undid the effect.
+
+    Yields a function to call before the first try, and later if the vehicle shows no effect. It
+    raises `ModeTakenOver` if a report since its first call has shown the effect.
+    """
+    is_commanded = was_seen = False
+
+    def note_effect(_: object) -> None:
+        nonlocal was_seen
+        with suppress(FlightEnded):  # raised again before the next try
+            was_seen = was_seen or (is_commanded and done())
+
+    def require_not_undone() -> None:
+        nonlocal is_commanded
+        is_commanded = True
+        if was_seen:
+            raise _taken_over(context.link)
+
+    unsubscribers = [
+        context.link.subscribe(name, note_effect) for name in ("HEARTBEAT", "CURRENT_MODE")
+    ]
+    try:
+        yield require_not_undone
+    finally:
+        for unsubscribe in unsubscribers:
+            unsubscribe()
 
 
 async def change_mode(
@@ -177,53 +225,6 @@ async def ask_to_hold(context: FlightContext, require_control: RequireControl) -
         context.link.autopilot.hold(),
         require_control,
         lambda: in_role(context.link, Role.HOLD),
-    )
-
-
-async def leave_offboard(
-    context: FlightContext, roles_forbidding_arming: frozenset[Role] = _OFFBOARD_ONLY
-) -> None:
-    """Change a disarmed vehicle from offboard to hold mode, because offboard forbids arming.
-
-    When PX4 disarms, it returns to the last mode that its user chose: OFFBOARD, if the landing
-    began there. PX4's pre-arm checks fail in AUTO.LAND, and in OFFBOARD without setpoints
-    (measured). Other modes and armed vehicles are left alone.
-
-    `roles_forbidding_arming`: roles of the modes to leave.
-
-    Raises:
-        FlightEnded: somebody else armed the vehicle or changed its mode, or hold was refused.
-    """
-    if context.armed() or not roles_of(context.link) & roles_forbidding_arming:
-        return
-    mode = context.link.state.mode
-    context.note(disarmed_text(mode))
-    context.waiting_for = f"the autopilot to leave {mode}"
-
-    def require_control() -> None:
-        if context.armed():
-            raise FlightEnded("somebody else armed the vehicle", Exit.RELEASE)
-        require_role(context.link, roles_forbidding_arming)
-
-    try:
-        await ask_to_hold(context, require_control)
-    except (CommandRefused, CommandTimeout) as error:
-        raise FlightEnded(left_disarmed_text(mode, error), Exit.LEAVE) from error
-
-
-def disarmed_text(mode: str | None) -> str:
-    """A sentence for the user: why the autopilot is asked to leave `mode`."""
-    return (
-        f"the vehicle is disarmed in {mode}, in which it cannot be armed again: asking the "
-        "autopilot to hold"
-    )
-
-
-def left_disarmed_text(mode: str | None, error: Exception) -> str:
-    """A sentence for the user: the autopilot did not leave `mode`, because of `error`."""
-    return (
-        f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "
-        f"command another mode ({error})"
     )
 
 

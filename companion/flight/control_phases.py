@@ -5,9 +5,10 @@ from collections import deque
 from collections.abc import Callable
 from math import degrees, radians
 
-from companion.flight.commands import command_if_ours, leave_offboard, require_role
+from companion.flight.commands import command_if_ours, require_role
 from companion.flight.context import FlightContext
 from companion.flight.hand_over import hand_over_to_hold, hand_over_to_landing
+from companion.flight.leave_offboard import leave_offboard
 from companion.guidance import ManeuverSequence
 from companion.guidance.fence import height_in_words
 from companion.guidance.source import ManeuverSource, Source

@@ -9,6 +9,7 @@ from companion.flight.commands import (
     ask_to_hold,
     change_mode,
     in_role,
+    require_armed_in_air,
     require_role,
 )
 from companion.flight.context import FlightContext, cancel
@@ -41,14 +42,16 @@ async def hand_over_to_hold(context: FlightContext) -> None:
     """Command hold mode until the autopilot holds; then release control.
 
     Raises:
-        FlightEnded: somebody else has the vehicle.
+        FlightEnded: somebody else has the vehicle, or it was disarmed in the air.
         CommandRefused: the autopilot refused.
     """
 
     def require_control() -> None:
         require_role(context.link, ROLES_BEFORE_LANDING)
+        require_armed_in_air(context)
 
     def holding() -> bool:
+        require_armed_in_air(context)
         return in_role(context.link, Role.HOLD)
 
     async def prepare_repetition(error: LinkError) -> RequireControl:

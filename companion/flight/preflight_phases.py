@@ -3,8 +3,9 @@
 from companion.config.known_drag import drag_before_connecting
 from companion.control.expected_response import gain_warning
 from companion.files.yaml_file import ConfigError
-from companion.flight.commands import command_if_ours, in_role, leave_offboard, require_role
+from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
+from companion.flight.leave_offboard import leave_offboard
 from companion.flight.maneuver_checks import require_inside, require_still_flyable
 from companion.guidance.fence import Place
 from companion.mavlink.commands import ARM, DISARM

@@ -55,7 +55,6 @@ def climb_has_ended(context: FlightContext) -> bool:
 
 async def takeoff(context: FlightContext) -> None:
     """Let the autopilot take off, and wait for the height."""
-    state = context.link.state
     context.replacement_detector.note_arming()
     north, east, _ = (await context.next_position()).position_ned
     await context.preflight.require(Stage.ARMED)
@@ -73,8 +72,8 @@ async def takeoff(context: FlightContext) -> None:
         _require_ground(context)
         context.must_disarm, context.takeoff_position = True, (north, east)
 
-    await command_if_ours(context, command, require_control, lambda: not state.landed)
     climb = _Climb(context, height)
+    await command_if_ours(context, command, require_control, climb.has_begun)
     await context.until(climb.is_over)
 
 
@@ -105,11 +104,21 @@ class _Climb:
         self._began = asyncio.get_running_loop().time()
         timeout = _LIFT_OFF_FRACTION * context.config.flight.takeoff_timeout_s
         self._lift_off_timeout = max(_SHORTEST_LIFT_OFF_TIMEOUT, timeout)
+        self._mode_before = context.link.state.mode
         self._has_begun = False
         self._hold_began: float | None = None
         self._ground_flag_at_height_since: float | None = None
         motion = context.guidance_loop.motion
         self._start_down = None if motion is None else motion.position_ned[2]
+
+    def has_begun(self) -> bool:
+        """Whether the autopilot is in a take-off mode of its own, or the vehicle has lifted off."""
+        state = self._context.link.state
+        is_taking_off = (
+            in_role(self._context.link, Role.TAKEOFF) and state.mode != self._mode_before
+        )
+        self._has_begun |= is_taking_off
+        return is_taking_off or not state.landed
 
     def is_over(self) -> bool:
         """Whether the height is reached; raise `FlightEnded` if somebody stopped the climb."""

@@ -6,7 +6,7 @@ from contextlib import suppress
 from math import degrees, hypot
 
 from companion.attitude.kinematics import tilt_angle
-from companion.flight.commands import change_mode, in_role, require_role
+from companion.flight.commands import change_mode, in_role, require_armed_in_air, require_role
 from companion.flight.context import FlightContext
 from companion.flight.preflight_phases import (
     check_vehicle,
@@ -214,19 +214,24 @@ async def _take_over(context: FlightContext) -> None:
         await stream(context)
     context.waiting_for = "the autopilot to obey our rates"
     context.loop.taking_over = True
+
+    def require_control() -> None:
+        require_role(context.link, {Role.READY})
+        require_armed_in_air(context)
+
+    def is_obeying() -> bool:
+        require_armed_in_air(context)
+        return in_role(context.link, Role.OFFBOARD)
+
     if autopilot.control_entry is ControlEntry.BY_FIRST_SETPOINT:
         # The known mode may be a second old, and a pilot may have taken over since.
         await context.fresh_heartbeat()
-        require_role(context.link, {Role.READY})
+        require_control()
         context.loop.on = True
-        await context.until(lambda: in_role(context.link, Role.OFFBOARD))
+        await context.until(is_obeying)
         return
-    await change_mode(
-        context,
-        autopilot.set_mode(autopilot.offboard_mode),
-        lambda: require_role(context.link, {Role.READY}),
-        lambda: in_role(context.link, Role.OFFBOARD),
-    )
+    offboard_command = autopilot.set_mode(autopilot.offboard_mode)
+    await change_mode(context, offboard_command, require_control, is_obeying)
 
 
 def _has_flight_command(context: FlightContext) -> bool:

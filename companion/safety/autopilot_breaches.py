@@ -13,10 +13,12 @@ ATTITUDE_FLAG, VELOCITY_FLAGS = 0x1, 0x2 | 0x4
 HORIZONTAL_POSITION_FLAGS = 0x8 | 0x10
 """Bits of ESTIMATOR_STATUS_FLAGS. The horizontal position is valid if either of its bits is set."""
 
+DISARMED_IN_FLIGHT = "the vehicle disarmed in flight"
+
 
 def disarmed(snapshot: Snapshot, _: bool) -> str | None:
     """The vehicle is disarmed, and not by `companion`: phases that disarm are not monitored."""
-    return None if snapshot.autopilot.armed else "the vehicle disarmed in flight"
+    return None if snapshot.autopilot.armed else DISARMED_IN_FLIGHT
 
 
 def landed(snapshot: Snapshot, _: bool) -> str | None:

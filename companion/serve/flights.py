@@ -3,7 +3,8 @@
 import asyncio
 import gc
 
-from companion.flight.commands import disarmed_text, in_role, left_disarmed_text
+from companion.flight.commands import in_role
+from companion.flight.leave_offboard import disarmed_text, left_disarmed_text
 from companion.mavlink.errors import CommandTimeout, LinkError
 from companion.serve.fence_across_flights import FenceAcrossFlights
 from companion.serve.ownership import Ownership, Program
@@ -14,6 +15,7 @@ from companion.vehicle.autopilot import Role
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
 _MAX_HOLD_TRIES = 4
+"""Largest number of commands of hold to a vehicle that a client has landed."""
 
 
 class ServedFlights:
@@ -33,7 +35,7 @@ class ServedFlights:
         self._clock, self._retry_time = asyncio.get_running_loop().time, 0.0
         self._task: asyncio.Task[None] | None = None
         self._unfinished_tasks: set[asyncio.Task[None]] = set()
-        self._controlled_since_arming = False
+        self._hold_tries_left, self._hold_is_commanded = 0, False
         vehicle.link.subscribe("HEARTBEAT", self._leave_offboard)
 
     @property
@@ -85,8 +87,9 @@ class ServedFlights:
             self.ownership.release()
             self.fence.set_first_centre(flight.fence_centre)
             self.current_flight = self._task = None
-            self._controlled_since_arming |= has_begun
-            if not has_begun:
+            if has_begun:
+                self._hold_tries_left = _MAX_HOLD_TRIES
+            else:
                 self._retry_time = self._clock() + _RETRY_PAUSE
             await flight.save()
             if self.current_flight is None and self._vehicle.config.realtime.freeze_gc:
@@ -97,33 +100,35 @@ class ServedFlights:
         task.add_done_callback(self._unfinished_tasks.discard)
 
     def _leave_offboard(self, _: object) -> None:
-        """Ask a vehicle that a client has landed to hold, if it could not be armed again.
+        """On a heartbeat, ask a vehicle that a client has landed to hold, unless it can be armed.
 
         PX4 returns to OFFBOARD, because this program chose that mode; see
-        `companion.flight.commands.leave_offboard`.
+        `companion.flight.leave_offboard`. Each try follows a heartbeat: a pilot may have changed
+        the mode since the last one.
         """
-        if self._vehicle.link.state.armed is not False or self.current_flight is not None:
+        link = self._vehicle.link
+        if link.state.armed is not False or self.current_flight or self._hold_is_commanded:
             return
-        was_controlled, self._controlled_since_arming = self._controlled_since_arming, False
-        if was_controlled and self._is_disarmed_in_offboard():
+        if not in_role(link, Role.OFFBOARD):
+            self._hold_tries_left = 0
+        if self._hold_tries_left > 0:
+            self._hold_is_commanded = True
             self._finish_before_close(asyncio.create_task(self._ask_to_hold()))
 
-    def _is_disarmed_in_offboard(self) -> bool:
-        link = self._vehicle.link
-        return link.state.armed is False and in_role(link, Role.OFFBOARD)
-
     async def _ask_to_hold(self) -> None:
-        """Command hold until the autopilot answers; not after another station changed the mode."""
+        """Command hold once."""
         link, tell = self._vehicle.link, self._vehicle.component.tell
         mode = link.state.mode
-        tell(disarmed_text(mode))
-        for tries_left in reversed(range(_MAX_HOLD_TRIES)):
-            try:
-                await link.command(*link.autopilot.hold(), retries=0)
-                return
-            except LinkError as error:
-                if not self._is_disarmed_in_offboard():
-                    return
-                if tries_left == 0 or not isinstance(error, CommandTimeout):
-                    tell(left_disarmed_text(mode, error))
-                    return
+        if self._hold_tries_left == _MAX_HOLD_TRIES:
+            tell(disarmed_text(mode))
+        self._hold_tries_left -= 1
+        try:
+            await link.command(*link.autopilot.hold(), retries=0)
+            self._hold_tries_left = 0
+        except LinkError as error:
+            if not isinstance(error, CommandTimeout):
+                self._hold_tries_left = 0
+            if self._hold_tries_left == 0:
+                tell(left_disarmed_text(mode, error))
+        finally:
+            self._hold_is_commanded = False

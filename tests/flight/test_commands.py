@@ -35,14 +35,14 @@ def test_every_command_of_a_flight_goes_through_one_function():
 
 
 class Vehicle:
-    """Answers as it is told to, one answer a command, and is in one mode after each of them."""
+    """Answers as it is told to, one answer a command, and reports its modes after each of them."""
 
     def __init__(self, *answers):
         self.answers = list(answers)
         self.mode, self.sent = Role.OFFBOARD, 0
         self.mode_by_failsafe = self.mode_not_intended = False
         self.link = self.autopilot = self.state = self
-        self.now = 0.0
+        self.now, self.subscribers = 0.0, []
         self.replacement_detector = SimpleNamespace(require=lambda: None)
 
     @property
@@ -52,8 +52,18 @@ class Vehicle:
     def roles(self, mode):
         return frozenset({mode})
 
+    def subscribe(self, _, callback):
+        self.subscribers.append(callback)
+        return lambda: self.subscribers.remove(callback)
+
+    def report(self, mode):
+        self.mode = mode
+        for each in self.subscribers:
+            each(None)
+
     async def fresh_heartbeat(self):
         await asyncio.sleep(0)
+        self.report(self.mode)
 
     async def until(self, condition):
         while not condition():  # noqa: ASYNC110
@@ -62,7 +72,9 @@ class Vehicle:
     async def command(self, number, *_, retries):
         assert retries == 0
         self.sent += 1
-        answer, self.mode = self.answers.pop(0)
+        answer, *modes = self.answers.pop(0)
+        for mode in modes:
+            self.report(mode)
         if answer is not None:
             raise answer
 
@@ -97,6 +109,32 @@ def test_it_is_not_repeated_over_a_mode_that_is_not_ours():
     with pytest.raises(FlightEnded, match="took over") as ended:
         run(vehicle)
     assert (ended.value.exit, vehicle.sent) == (Exit.RELEASE, 1)
+
+
+@pytest.mark.parametrize("tries", [1, 4])
+def test_a_command_that_was_obeyed_and_undone_by_others_is_not_repeated(tries):
+    """Its answer was lost, and the pilot chose a mode in which we might command."""
+    lost = [(LOST, Role.OFFBOARD)] * (tries - 1)
+    vehicle = Vehicle(*lost, (LOST, Role.LAND, Role.OFFBOARD), (None, Role.LAND))
+    with pytest.raises(FlightEnded, match="took over") as ended:
+        run(vehicle)
+    assert (ended.value.exit, vehicle.sent) == (Exit.RELEASE, tries)
+    assert not vehicle.subscribers
+
+
+def test_an_effect_from_before_the_first_try_is_not_the_command_s():
+    vehicle = Vehicle((LOST, Role.OFFBOARD), (None, Role.LAND))
+    vehicle.mode = Role.LAND
+
+    async def scene():
+        def require_control():
+            require_role(vehicle, {Role.OFFBOARD, Role.LAND})
+            vehicle.mode = Role.OFFBOARD  # as a heartbeat from before our arming shows disarmed
+
+        await command_if_ours(vehicle, LAND, require_control, lambda: vehicle.mode is Role.LAND)
+
+    asyncio.run(scene())
+    assert vehicle.sent == 2
 
 
 def test_a_refusal_is_one():

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.commands import leave_offboard
 from companion.flight.control_phases import _require_landing
+from companion.flight.leave_offboard import leave_offboard
 from companion.mavlink.errors import CommandRefused
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.ardupilot.autopilot import ArduPilot
@@ -47,6 +47,9 @@ class Vehicle:
         self.replacement_detector = SimpleNamespace(require=lambda: None)
 
     mode_received_at = 0.0
+
+    def subscribe(self, *_):
+        return lambda: None
 
     def armed(self):
         return self.is_armed

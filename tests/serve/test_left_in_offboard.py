@@ -5,6 +5,8 @@ import asyncio
 from tests.serve.virtual import POSITION, MemoryClient, airborne, begin_control, mock, served
 
 _SET_MODE, _ARM, _AUTO, _LAND = 176, 400, 4, 6
+_MODE_REPORTS = 0, 436
+"""Ids of HEARTBEAT and CURRENT_MODE."""
 
 
 def test_a_vehicle_that_a_client_has_landed_can_be_armed_again():
@@ -35,6 +37,31 @@ def test_a_pilot_who_chooses_a_mode_is_not_told_to_hold_again():
         await asyncio.sleep(0.5)
         vehicle.clear_faults()
         await asyncio.sleep(5.0)
+        assert vehicle.state()["mode"] == "POSCTL", script.texts()
+
+    served(vehicle, "px4", scene)
+
+
+def test_hold_is_not_sent_again_on_an_old_report_of_the_mode():
+    """Lost are the first command, and the reports of the mode until after the second would go."""
+    vehicle = mock("px4")
+
+    def without_mode(data):
+        return [] if int.from_bytes(data[7:10], "little") in _MODE_REPORTS else [data]
+
+    async def scene(session):
+        script = await _landed_by_a_client(session, vehicle)
+        vehicle.inject({"kind": "drop", "direction": "from_companion"})
+        async with asyncio.timeout(2.0):
+            while not script.texts()[-1].endswith("to hold"):  # noqa: ASYNC110  texts set no events
+                await asyncio.sleep(0.01)
+        vehicle.to_companion = without_mode
+        vehicle.take_over("POSCTL")
+        await asyncio.sleep(0.9)
+        vehicle.clear_faults()
+        await asyncio.sleep(0.3)
+        vehicle.to_companion = None
+        await asyncio.sleep(4.0)
         assert vehicle.state()["mode"] == "POSCTL", script.texts()
 
     served(vehicle, "px4", scene)
