@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from math import cos, inf, isfinite, pi, radians, sin
 from typing import Literal, NamedTuple
 
-_SMALLEST_LIMIT = 1e-6
-"""Smallest limit that is accepted, rad or rad/s; and smallest gain, 1/s."""
+SMALLEST_LIMIT = 1e-6
+"""Smallest limit, gain and damping that are accepted, in SI units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("max_tilt", "max_tilt_rate", "max_yaw_rate"):
             value = getattr(self, name)
-            if value is not None and not (isfinite(value) and value >= _SMALLEST_LIMIT):
+            if value is not None and not (isfinite(value) and value >= SMALLEST_LIMIT):
                 raise ValueError(f"{name} must be positive and finite, not {value}")
         if self.max_tilt is not None and self.max_tilt >= pi / 2.0:
             raise ValueError(f"max_tilt must be below 90°, not {self.max_tilt:.4g} rad")
@@ -122,8 +122,8 @@ def make_constants(
     """
     if not isinstance(limits, Limits):
         raise TypeError(f"limits must be a companion.attitude.Limits, not {limits!r}")
-    if not _SMALLEST_LIMIT <= gain < inf:
-        raise ValueError(f"gain must be at least {_SMALLEST_LIMIT:g} 1/s and finite, not {gain}")
+    if not SMALLEST_LIMIT <= gain < inf:
+        raise ValueError(f"gain must be at least {SMALLEST_LIMIT:g} 1/s and finite, not {gain}")
     if not 0.0 <= yaw_gain < inf:
         raise ValueError(f"yaw_gain must be finite and not negative, not {yaw_gain}")
     if not 0.0 < recovery_angle <= radians(80.0):

@@ -3,10 +3,10 @@
 from dataclasses import dataclass, replace
 from math import atan2, hypot, inf, pi, sqrt
 
+from companion.attitude.limits import SMALLEST_LIMIT
+
 _LONGEST_LAG_OR_DEAD_TIME = 1.0
 """Longest lag, dead time or lead that is accepted, s."""
-_SMALLEST_LIMIT = 1e-6
-"""Smallest slew limit, rad/s², and smallest damping that are accepted."""
 _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
 
@@ -105,8 +105,8 @@ def _check_time(name: str, value: float) -> None:
 
 
 def _check_large_enough(name: str, value: float) -> None:
-    if not value >= _SMALLEST_LIMIT:
-        raise ValueError(f"{name} must be at least {_SMALLEST_LIMIT:g}, not {value}")
+    if not value >= SMALLEST_LIMIT:
+        raise ValueError(f"{name} must be at least {SMALLEST_LIMIT:g}, not {value}")
 
 
 def largest_gain(lag: float, dead_time: float, sigma: float = 0.0) -> float:
