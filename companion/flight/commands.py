@@ -11,8 +11,7 @@ from contextlib import contextmanager, suppress
 from companion.flight.context import FlightContext
 from companion.mavlink.commands import Command, command_name
 from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
-from companion.safety.actions import ControlReleased, Exit, FlightEnded
-from companion.safety.autopilot_breaches import DISARMED_IN_FLIGHT
+from companion.safety.actions import DISARMED_IN_FLIGHT, ControlReleased, Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
 

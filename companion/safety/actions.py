@@ -4,6 +4,9 @@ from enum import Enum
 
 from companion.user_code import UserCodeError
 
+DISARMED_IN_FLIGHT = "the vehicle disarmed in flight"
+"""The words of a flight that ends because others disarmed the vehicle in the air."""
+
 
 class Action(Enum):
     """The actions by rising severity; the value is the word used in messages and in YAML.

@@ -5,6 +5,7 @@ The docstring of each check states its breach.
 
 from math import degrees
 
+from companion.safety.actions import DISARMED_IN_FLIGHT
 from companion.safety.monitor import BreachCheck, above
 from companion.safety.snapshot import Snapshot
 from companion.vehicle.records import gps_fault, is_outdated
@@ -12,8 +13,6 @@ from companion.vehicle.records import gps_fault, is_outdated
 ATTITUDE_FLAG, VELOCITY_FLAGS = 0x1, 0x2 | 0x4
 HORIZONTAL_POSITION_FLAGS = 0x8 | 0x10
 """Bits of ESTIMATOR_STATUS_FLAGS. The horizontal position is valid if either of its bits is set."""
-
-DISARMED_IN_FLIGHT = "the vehicle disarmed in flight"
 
 
 def disarmed(snapshot: Snapshot, _: bool) -> str | None:
