@@ -87,17 +87,17 @@ class EkfConfig(Section):
 EKFS: dict[str, EkfConfig | None] = {
     "none": None,
     "px4": EkfConfig(),
-    # Fitted to the errors of position and velocity, sample by sample, in circles at 2, 5, 8 and
-    # 10 m/s and figure-eights at 5 and 8 m/s. The fit leaves 0.01 to 0.03 m and 0.02 to 0.03 m/s
-    # unexplained: 14 to 35 % of the errors, and more at 2 m/s.
+    # Fitted to the errors of position and velocity, sample by sample, in 17 flights of circles at 5
+    # and 8 m/s and figure-eights at 5 and 8 m/s. The fit leaves position errors of 3 to 7 ms times
+    # the speed unexplained.
     "ardupilot": EkfConfig(
         fix_period_ms=200.0,
         fix_delay_ms=447.0,
-        position_late_ms=32.2,
-        velocity_late_ms=20.5,
-        # In recorded circles the delay of the position falls by 10 ms, then rises again, every 13
-        # to 15 s.
-        fix_slip_ms=12.5,
+        position_late_ms=26.3,
+        velocity_late_ms=17.6,
+        # In recorded circles the delay of the position falls by 8 ms, then rises again, every 8 to
+        # 14 s.
+        fix_slip_ms=8.0,
         position_noise_m=0.005,
         velocity_noise_m_s=0.005,
         tilt_noise_deg=0.006,
@@ -105,10 +105,10 @@ EKFS: dict[str, EkfConfig | None] = {
         # flights had a total tilt of 0.05 to 0.3 degrees; here it is 0.14.
         tilt_bias_deg=(0.12, 0.07),
         yaw_error_deg=0.1,
-        turn_yaw_ms=22.7,
+        turn_yaw_ms=15.4,
         compass_error_deg=1.03,
         yaw_rate_bias_deg_s=0.05,
-        acceleration_lead_ms=-1.5,
+        acceleration_lead_ms=-0.9,
         acceleration_scale=0.0007,
         vertical_share=0.6,
         height_offset_m=0.1,
@@ -116,10 +116,10 @@ EKFS: dict[str, EkfConfig | None] = {
         sink_per_acceleration_ms=0.0,
         height_noise_m=0.014,
         height_noise_time_s=6.0,
-        position_gains=(0.0347, 0.1052),
-        velocity_gains=(0.1096, 0.1649),
-        acceleration_gains=(0.0077, 0.0312),
-        predictor_ms=206.0,
+        position_gains=(0.0367, 0.1088),
+        velocity_gains=(0.116, 0.1706),
+        acceleration_gains=(0.0082, 0.0323),
+        predictor_ms=258.0,
     ),
 }
 """Preset name -> navigation filter."""

@@ -116,10 +116,10 @@ def quiet(name):
 
 
 def test_a_turn_teaches_a_wrong_heading():
-    """Measured on ArduPilot: 1.2 to 1.4 degrees within 5 s of a circle; 0.6 in a figure-eight."""
+    """Measured on ArduPilot: 0.9 to 1.4 degrees within 5 s of a circle; 0.6 in a figure-eight."""
     way = circle(5.0, 1.0)
     rows = errors(quiet("ardupilot"), way, 60.0)
-    assert np.degrees(rows[[200, -1], 9]) == pytest.approx(1.38, abs=0.2)
+    assert np.degrees(rows[[200, -1], 9]) == pytest.approx(1.15, abs=0.25)
     assert abs(share(rows, 1, way, 0, 1.0) - (-0.0155 + 0.0040j)) < 0.0055
     rows = errors(quiet("ardupilot"), eight(3.1, 1.179), 60.0)
     assert abs(np.degrees(rows[:, 9]).mean()) < 0.6
