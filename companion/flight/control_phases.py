@@ -19,9 +19,6 @@ from companion.vehicle.autopilot import Role
 _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
 
-_FALLING_SPEED = 2.5
-"""Downward speed above which a disarmed vehicle is falling, m/s; a landed vehicle has no speed."""
-
 _UPRIGHT_TILT = radians(45.0)
 """Largest tilt of a vehicle that stands after a landing, rad; no slope to land on is steeper."""
 
@@ -159,7 +156,6 @@ async def land(context: FlightContext) -> None:
             "" if height is None else f", now {height_in_words(height)}"
         )
         _require_landing(context)
-        _require_not_falling(context)
         return context.ground.has_touched_down
 
     try:
@@ -204,18 +200,6 @@ async def disarm(context: FlightContext) -> None:
     await context.fresh_heartbeat()
     await leave_offboard(context)
     _require_upright(context)
-
-
-def _require_not_falling(context: FlightContext) -> None:
-    """Raise `FlightEnded` if the vehicle was disarmed in the air and falls."""
-    position = context.fresh_position()
-    is_falling = position is not None and position.velocity_ned[2] > _FALLING_SPEED
-    if is_falling and not context.armed():
-        raise FlightEnded(
-            "the pilot, the autopilot or another station disarmed the vehicle in the air during "
-            "the landing, and it fell",
-            Exit.RELEASE,
-        )
 
 
 def _require_upright(context: FlightContext) -> None:

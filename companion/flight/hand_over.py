@@ -17,7 +17,7 @@ from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkError, LinkLost
 from companion.mavlink.messages import dialect
 from companion.mavlink.texts import status_texts
-from companion.safety.actions import FlightEnded, fault_message
+from companion.safety.actions import Exit, FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
 _REPETITION_PAUSE = 1.0
@@ -27,6 +27,9 @@ a refusal may have ended by then."""
 _PILOT_WARNING_TIME = 10.0
 """Time after which the pilot of a vehicle that has not begun to land is warned, s; also the time
 between two warnings."""
+
+_FALLING_SPEED = 2.5
+"""Downward speed above which a disarmed vehicle is falling, m/s; a landed vehicle has no speed."""
 
 _PILOT_WARNING = "Companion: vehicle does not land. Switch its mode!"
 """Text for the pilot's ground station; it fits into one STATUSTEXT."""
@@ -196,6 +199,18 @@ async def _hold_before_repetition(context: FlightContext, landing: IsDone) -> No
             raise
         return
     context.release()
+
+
+def require_not_falling(context: FlightContext) -> None:
+    """Raise `FlightEnded` if the vehicle was disarmed in the air and falls."""
+    position = context.fresh_position()
+    is_falling = position is not None and position.velocity_ned[2] > _FALLING_SPEED
+    if is_falling and not context.armed():
+        raise FlightEnded(
+            "the pilot, the autopilot or another station disarmed the vehicle in the air during "
+            "the landing, and it fell",
+            Exit.RELEASE,
+        )
 
 
 def stop_moving(context: FlightContext) -> None:

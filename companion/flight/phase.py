@@ -32,6 +32,8 @@ class Phase:
     monitored: bool = False
     """Whether the safety monitors may end the phase. The phases of an exit are not monitored: the
     breach that caused the exit would end them, too."""
+    lands: bool = False
+    """Whether the vehicle lands in the phase. If it is disarmed and falls, the phase has failed."""
 
     def exit_on_failure(self, *, standing: bool) -> Exit:
         """What the flight does if the phase fails; `standing`: the vehicle stands on the ground."""

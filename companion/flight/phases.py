@@ -32,7 +32,12 @@ HAND_BACK = Phase(
 """The phase in which the autopilot holds by itself and our setpoints stop."""
 
 _LAND = Phase(
-    "land", "touchdown", control_phases.land, inf, allowed_roles=ROLES_BEFORE_LANDING | {Role.LAND}
+    "land",
+    "touchdown",
+    control_phases.land,
+    inf,
+    allowed_roles=ROLES_BEFORE_LANDING | {Role.LAND},
+    lands=True,
 )
 """The phase of the landing. `control_phases.land` itself limits the time until the landing begins,
 and until touchdown. A vehicle that would drift without our setpoints is held beyond this limit."""

@@ -1,5 +1,9 @@
 """The phases on the ground, and the phase that disarms after a failure, one coroutine each."""
 
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+
 from companion.config.known_drag import drag_before_connecting
 from companion.control.expected_response import gain_warning
 from companion.files.yaml_file import ConfigError
@@ -18,6 +22,8 @@ from companion.vehicle.parameter_rules import CheckResult, Values
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
+_ARMED_REPORT_TIMEOUT = 1.5
+"""Longest time from arming to a heartbeat with the armed flag, s: PX4 sends one a second."""
 
 
 async def connect(context: FlightContext) -> None:
@@ -147,7 +153,23 @@ async def _arm(context: FlightContext) -> None:
 
     context.replacement_detector.note_arming()
     await command_if_ours(context, ARM, require_control, armed)
-    await context.until(armed, "the vehicle to be armed")
+    await wait_until_armed(context, armed)
+    if not armed():
+        await context.fresh_heartbeat()
+    if not armed():
+        raise FlightEnded(
+            "the autopilot accepted arming, but reports that it is disarmed", Exit.LEAVE
+        )
+
+
+async def wait_until_armed(context: FlightContext, armed: Callable[[], bool]) -> None:
+    """Wait until `armed` shows an arming in a heartbeat, but not for long; raises what it raises.
+
+    The newest heartbeat may be older than the arming.
+    """
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_ARMED_REPORT_TIMEOUT):
+            await context.until(armed, "the vehicle to show that it is armed")
 
 
 def _require_unchanged_by_others(context: FlightContext) -> None:

@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Callable
-from contextlib import suppress
 from math import degrees, hypot
 
 from companion.attitude.kinematics import tilt_angle
@@ -14,14 +13,12 @@ from companion.flight.preflight_phases import (
     request_telemetry,
     stream,
     use_evidence,
+    wait_until_armed,
 )
 from companion.flight.takeoff import MAX_UNDERSHOOT, climb_has_ended
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
-
-_ARMED_REPORT_TIMEOUT = 1.5
-"""Longest time from arming to a heartbeat with the armed flag, s: PX4 sends one a second."""
 
 _LARGEST_HELD_SPEED = 3.0
 """Largest horizontal speed of a vehicle that is taken over, m/s."""
@@ -96,14 +93,10 @@ async def check_airborne(context: FlightContext) -> None:
 async def check_armed_on_ground(context: FlightContext) -> None:
     """Check a vehicle that somebody else armed on the ground; only request telemetry.
 
-    The newest heartbeat may be older than the arming, so this function waits for the armed flag.
-
     Raises:
         FlightEnded: the vehicle is not armed on the ground, or a finding blocks the take-off.
     """
-    with suppress(TimeoutError):
-        async with asyncio.timeout(_ARMED_REPORT_TIMEOUT):
-            await context.until(context.armed, "the vehicle to show that it is armed")
+    await wait_until_armed(context, context.armed)
     await _check_stage(context, Stage.ARMED, _require_armed_on_ground)
     await context.until(lambda: context.link.state.home is not None, "the home position")
 

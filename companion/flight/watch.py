@@ -6,7 +6,7 @@ from math import inf
 
 from companion.flight.commands import require_role, roles_of
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
-from companion.flight.hand_over import stop_moving
+from companion.flight.hand_over import require_not_falling, stop_moving
 from companion.flight.hold_inside import brake_inside_fence
 from companion.flight.phase import Phase
 from companion.flight.rate_requester import RateRequester
@@ -58,6 +58,8 @@ class Watch:
         self._context.ground.update()
         self._context.replacement_detector.update()
         self._context.replacement_detector.require()
+        if phase.lands:  # also while its command is not answered: a fall is soon over
+            require_not_falling(self._context)
         in_control = phase.monitored and self._context.loop.offboard_active
         if in_control and self._context.link.state.armed is False:
             self._check_snapshot(now)  # first: ArduPilot also changes its mode then

@@ -5,10 +5,10 @@ from pymavlink.dialects.v20 import common as dialect
 
 from tests.flight.fly import fly, mock_vehicle
 
-SET_MODE, TAKEOFF, LAND = 176, 22, 21
+SET_MODE, TAKEOFF, LAND, ARM = 176, 22, 21, 400
 LOST_FOR, LATER = 1.2, 0.1
 HOLD = SET_MODE, 1, 4, 3
-KILL = 400, 0, 21196
+KILL = ARM, 0, 21196
 
 
 class LostAnswers:
@@ -78,3 +78,32 @@ def test_a_vehicle_killed_in_the_air_is_commanded_no_more(begins):
         assert mock.state()["crashed"]
     assert summary.result == "the vehicle disarmed in flight"
     assert lost.sent_later == []
+
+
+def test_a_pilot_who_disarms_before_a_heartbeat_shows_the_arming_is_told_soon():
+    """The phase waited for the armed flag until its timeout, a minute."""
+    with mock_vehicle() as mock:
+
+        def disarm():
+            mock.command(ARM, 0)
+
+        LostAnswers(mock, lambda sent: sent.command == ARM, disarm, lost="HEARTBEAT")
+        summary = fly(mock)
+        assert mock.state()["armed"] is False
+    assert summary.result == "the autopilot accepted arming, but reports that it is disarmed"
+    assert summary.events[-1][0] < 20.0
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_vehicle_killed_before_the_landing_is_answered_did_not_land_well(autopilot):
+    """The fall was over when the next try of the command looked for its effect."""
+    with mock_vehicle(autopilot=autopilot) as mock:
+
+        def is_landing(sent):
+            return sent.command == LAND or (sent.command, sent.param2) == (SET_MODE, 9)
+
+        LostAnswers(mock, is_landing, lambda: mock.command(*KILL))
+        summary = fly(mock, hover={"duration_s": 0.5})
+    assert summary.result.endswith(
+        "disarmed the vehicle in the air during the landing, and it fell"
+    )
