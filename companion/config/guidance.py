@@ -84,12 +84,13 @@ class GuidanceConfig(Section):
     """LQR weight of the horizontal velocity error; a larger weight damps the position hold more.
     null: 1/T², T as in position_weight_per_s4.
     """
-    disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = Field(
+    disturbance_bandwidth_rad_s: Annotated[float, Field(ge=0.5, le=30.0)] | None = Field(
         default=None, json_schema_extra=TUNABLE
     )
-    """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
-    null: 1.5/T, T as in position_weight_per_s4. With a quick rate loop the bandwidth rises up to
-    2.4/T while the vehicle moves and its measured positions have little noise."""
+    """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt. With less
+    than the smallest value, wind carries the vehicle away by metres. null: 1.5/T, T as in
+    position_weight_per_s4. With a quick rate loop the bandwidth rises up to 2.4/T while the vehicle
+    moves and its measured positions have little noise."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Delay of the autopilot's position beyond what its estimator assumes, for example because of a
     wrong GPS delay parameter. Measure it against an independent position.

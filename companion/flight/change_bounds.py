@@ -3,16 +3,13 @@
 from math import inf
 
 from companion.config import Config
-from companion.config.in_flight import Difference, changeable_keys, differences, value_text
+from companion.config.in_flight import Difference, changeable_keys, differences
 from companion.control.hold_settings import flies_identify
 from companion.control.retuning import value_in_effect
 from companion.files.yaml_file import ConfigError
 
 LARGEST_CHANGE_FACTOR = 3.0
 """Largest factor by which a change may multiply or divide a value."""
-_SMALLEST_VALUES = {"limits.max_tilt_deg": 5.0, "limits.max_tilt_rate_deg_s": 20.0}
-"""Smallest values in flight, in the unit of the key: with less tilt or tilt rate, the vehicle
-cannot hold its position in wind."""
 _NEVER_ZERO_KEYS = frozenset(
     {"planner.yaw_gain_per_s", "guidance.height_gain_per_s", "guidance.climb_gain_per_s"}
 )
@@ -57,9 +54,6 @@ def _refusal(before: Config, after: Config, change: Difference) -> str | None:
         )
     if key in _NEVER_ZERO_KEYS and change.after == 0.0:
         return f"{key} must not become 0 in flight"
-    smallest = _SMALLEST_VALUES.get(key)
-    if smallest is not None and change.after < smallest:
-        return f"{key} must be at least {smallest:g} in flight, not {value_text(change.after)}"
     old = value_in_effect(before, change, change.before)
     new = value_in_effect(after, change, change.after)
     low, high = min(old, new), max(old, new)

@@ -104,7 +104,7 @@ def test_a_file_is_printed_whole(path, capsys):
     assert main(["config", str(path)]) == 0
     out = capsys.readouterr().out
     in_flight = "changeable in flight up to its value at the start"
-    assert f"max_tilt_deg: 25.0  # °, at least 1, at most 60, {in_flight}; default: 35.0" in out
+    assert f"max_tilt_deg: 25.0  # °, at least 5, at most 60, {in_flight}; default: 35.0" in out
 
 
 def test_one_key_or_one_section_is_printed(capsys):

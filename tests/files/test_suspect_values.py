@@ -13,7 +13,7 @@ MOCK = {"mock": {}}
 @pytest.mark.parametrize(
     ("section", "key", "value", "meant"),
     [
-        ("limits", "max_tilt_rate_deg_s", 1.57, "89.95"),
+        ("limits", "max_yaw_rate_deg_s", 1.57, "89.95"),
         ("limits", "max_yaw_rate_deg_s", 1.05, "60.16"),
         ("limits", "min_battery_percent", 0.4, "40"),
         ("vehicle", "lag_ms", 0.047, "47"),

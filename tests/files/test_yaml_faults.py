@@ -40,7 +40,7 @@ def told(tmp_path, text):
         ("limits: {max_tilt_deg: steep}", "write digits, with a point for decimals"),
         (
             "limits:\n\n  max_tilt_deg: 0.35\n",
-            "line 3: `limits.max_tilt_deg` must be at least 1 (got",
+            "line 3: `limits.max_tilt_deg` must be at least 5 (got",
         ),
         ("limits: {max_tilt_deg: 0.35}", "(got 0.35); if it is in rad, write 20.05"),
         ("deadman: {telemetry_stale_ms: 0.1}", "if it is in s, write 100"),

@@ -472,14 +472,14 @@ def test_an_exception_lets_one_finding_pass_and_no_other():
 def test_times_that_are_not_the_vehicles_own_and_units_mistaken_are_told():
     wrong = {
         "vehicle": {"identified": None},
-        "limits": {"max_tilt_rate_deg_s": 1.57},
+        "limits": {"max_yaw_rate_deg_s": 1.57},
         "safety": {"max_body_rate_deg_s": 20.0},
     }
     config = changed(CONFIG, wrong, "test")
     found = {one.key: one for one in configuration_checks.doubtful_values(config, GOOD)}
     assert set(found) == {Key.IDENTIFIED, Key.UNITS, Key.BODY_RATE_KEY}
     assert all(one.result is CheckResult.INEFFECTIVE for one in found.values())
-    assert found[Key.UNITS].source == "limits.max_tilt_rate_deg_s"
+    assert found[Key.UNITS].source == "limits.max_yaw_rate_deg_s"
     assert list(configuration_checks.doubtful_values(CONFIG, GOOD)) == []
 
 
