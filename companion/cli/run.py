@@ -50,9 +50,6 @@ def run(command: Command, options: argparse.Namespace) -> int:
 
     With `--json`, a command that an error ends before it prints its figures prints the error's
     text as `result`, so its output can be parsed.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C where no flight handles it.
     """
     exit_code = EXIT_FAILURE
     reason: str | None = None
@@ -69,6 +66,8 @@ def run(command: Command, options: argparse.Namespace) -> int:
         os_error = error
     except asyncio.CancelledError:
         reason = "interrupted before anything was sent"
+    except KeyboardInterrupt:  # where no flight handles it
+        reason = "interrupted"
     except Exception as error:
         if options.debug:
             traceback.print_exc()

@@ -52,14 +52,18 @@ class Outbox:
         self.last_setpoint_at = self._loop.time()
         return was_sent
 
-    def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
+    def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         """Keep a setpoint for `close_step`; a later setpoint in the same step replaces it.
+
+        Returns:
+            Whether there is a connection to send it on.
 
         Raises:
             InvalidSetpoint: see `send_setpoint`; nothing was kept.
         """
         self._setpoint_encoder.frame(0, time_boot_ms, rates, thrust)
         self._latched_setpoint = (time_boot_ms, rates, thrust)
+        return self.transport is not None
 
     def close_step(self, time_boot_ms: int) -> None:
         """Close a lockstep step: send the setpoint kept by `latch`, or else a SYSTEM_TIME.

@@ -162,7 +162,8 @@ class Link(VehicleClient, LinkCallbacks):
             thrust: collective thrust, 0..1.
 
         Returns:
-            Whether the setpoint was sent; False if the connection is down or the kernel refuses it.
+            Whether the setpoint was sent, or in lockstep will be sent; False if the connection is
+            down or the kernel refuses it.
 
         Raises:
             InvalidSetpoint: a value is out of range, or not finite; nothing was sent.
@@ -171,8 +172,7 @@ class Link(VehicleClient, LinkCallbacks):
             self._lockstep_inbox is not None
             and self._lockstep_inbox.open_step_time_ms == time_boot_ms
         ):
-            self._outbox.latch(time_boot_ms, rates, thrust)
-            return True
+            return self._outbox.latch(time_boot_ms, rates, thrust)
         return self._outbox.send_setpoint(time_boot_ms, rates, thrust)
 
     # --- internal

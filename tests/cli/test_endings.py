@@ -423,7 +423,9 @@ def test_an_option_that_would_have_no_effect_is_refused(options, told, capsys):
     assert told in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("error", [ConfigError('bad "key"'), LinkError("none"), ENOSPC])
+@pytest.mark.parametrize(
+    "error", [ConfigError('bad "key"'), LinkError("none"), ENOSPC, KeyboardInterrupt()]
+)
 def test_an_error_of_a_command_with_json_is_json(capsys, error):
     """Standard output was empty, so a script that parses it failed with an error of its own."""
 

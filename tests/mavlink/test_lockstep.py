@@ -9,7 +9,9 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.attitude import BodyRates
 from companion.mavlink import lockstep
 from companion.mavlink.errors import LinkTimeout
+from companion.mavlink.outbox import Outbox
 from companion.mavlink.settings import LinkSettings
+from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport import udp
 from companion.mavlink.transport.free_port import free_port
 from companion.vehicle.link import Link
@@ -231,3 +233,10 @@ def test_a_vehicle_that_starts_anew_does_not_turn_our_time_back(monkeypatch):
 
     first.start()
     lockstep.run(scene())
+
+
+def test_a_setpoint_of_a_step_is_not_called_sent_without_a_connection():
+    async def latched():
+        return Outbox(settings(1), LinkStats(), None).latch(4, LEVEL, 0.5)
+
+    assert asyncio.run(latched()) is False

@@ -1,6 +1,7 @@
 """Slowing down in parts: limits hold everywhere, the path is the same, and no more is slowed."""
 
 import pickle
+from dataclasses import replace
 from functools import cache
 from math import radians
 
@@ -25,11 +26,13 @@ from companion.guidance.trajectory import (
     gerono_eight,
     helix,
     line,
+    motion_violations,
     slow_down,
     violations,
     waypoints,
 )
 from companion.guidance.trajectory.csv_file import parse_csv
+from companion.guidance.trajectory.demand import sampled_motion
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,
@@ -52,7 +55,7 @@ EIGHT = gerono_eight(3.0, Laps(5.0, 2, face_path=True))
 CORNERS = waypoints([(20.0, 0, 0), (20.0, 3.0, 0), (0, 3.0, -2.0)], 6.0, 9.0)
 
 
-def _angular(side=12.0, speed=3.0):
+def _angular(side=12.0, speed=3.0, cutoff=1.0):
     """Samples of three legs with sharp corners, at a steady speed."""
     lines = ["t,x,y,z"]
     for k in range(int(3 * side / speed * 20) + 1):
@@ -60,7 +63,7 @@ def _angular(side=12.0, speed=3.0):
         x = min(way, side) - min(max(way - 2 * side, 0.0), side)
         lines.append(f"{k / 20},{x},{min(max(way - side, 0.0), side)},0")
     return from_samples(
-        parse_csv(lines, "angular"), SampleOptions(Frame.NED, cutoff=1.0), "angular"
+        parse_csv(lines, "angular"), SampleOptions(Frame.NED, cutoff=cutoff), "angular"
     )
 
 
@@ -113,6 +116,15 @@ def needs_by_differences(trajectory, count=2001):
     tilt = np.arccos(-force[:, 2] / thrust)
     tilt_rate = np.linalg.norm(np.cross(force, growth), axis=1) / thrust**2
     return tilt, tilt_rate, thrust, -velocity[:, 2], speed
+
+
+def test_the_limits_hold_where_two_pieces_of_the_stretch_factor_meet():
+    """The jerk has its peaks there, and the times checked went past them."""
+    envelope = replace(ENVELOPE, max_tilt=radians(50.0), max_tilt_rate=radians(20.0))
+    law = slow_down(table := _angular(6.8567, 3.1748, cutoff=3.0), envelope).trajectory.law
+    ends = np.linspace(0.0, law.original_duration, len(law.coefficients) - 2)
+    slower = sampled_motion(table, ends.tolist()).retimed(*law.stretched_times(ends))
+    assert [str(each) for each in motion_violations(slower, envelope)] == []
 
 
 @pytest.mark.parametrize("name", TRAJECTORIES)

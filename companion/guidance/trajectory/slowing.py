@@ -133,11 +133,15 @@ def _slowed_evenly(
 
 
 def _denser_times(times: Floats) -> Floats:
-    """Check times, evenly spaced times, and times that fill long gaps (laps without checks)."""
+    """Check times, evenly spaced times, and times that fill long gaps (laps without checks).
+
+    The ends of the pieces of each stretch factor are among them: the jerk has its peaks there.
+    """
     gaps = np.diff(times)
     median_gap = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
     duration = float(times[-1])
     time_arrays = [times, np.linspace(0.0, duration, int(duration / _check_step(duration)) + 2)]
+    time_arrays += [np.linspace(0.0, duration, count + 1) for count in _piece_counts(duration)]
     for k in np.flatnonzero(gaps > _LONG_GAP_FACTOR * median_gap):
         count = min(int(gaps[k] / (_FILL_STEP_FACTOR * median_gap)), _MAX_CHECK_TIMES)
         time_arrays.append(np.linspace(times[k], times[k + 1], count + 1))
@@ -149,12 +153,19 @@ def _check_step(duration: float) -> float:
     return max(_SHORTEST_CHECK_STEP, duration / _MAX_EVEN_CHECK_TIMES)
 
 
+def _piece_counts(duration: float) -> list[int]:
+    """The numbers of pieces to try for the stretch factor of a trajectory of `duration` s."""
+    shortest, longest = _CHECK_TIMES_PER_PIECE * _check_step(duration), duration / _FEWEST_PIECES
+    return [
+        int(np.ceil(duration / each)) for each in _PIECE_DURATIONS if shortest <= each <= longest
+    ]
+
+
 def _best_law(motion: Motion, duration: float, envelope: Envelope) -> SlowerTime | None:
     """The time law by which the flight is shortest; None: none was found that keeps the limits."""
     needed = _needed_factors(motion, envelope)
-    shortest, longest = _CHECK_TIMES_PER_PIECE * _check_step(duration), duration / _FEWEST_PIECES
-    durations = [each for each in _PIECE_DURATIONS if shortest <= each <= longest]
-    laws = [_law_with_pieces(motion, needed, duration, each, envelope) for each in durations]
+    counts = _piece_counts(duration)
+    laws = [_law_with_pieces(motion, needed, duration, count, envelope) for count in counts]
     return min((law for law in laws if law), key=lambda law: law.duration, default=None)
 
 
@@ -176,10 +187,9 @@ def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
 
 
 def _law_with_pieces(
-    motion: Motion, needed: Floats, duration: float, piece_duration: float, envelope: Envelope
+    motion: Motion, needed: Floats, duration: float, count: int, envelope: Envelope
 ) -> SlowerTime | None:
-    """A stretch factor of at least `needed` (m,); pieces of `piece_duration` s. None: not found."""
-    count = int(np.ceil(duration / piece_duration))
+    """A stretch factor of at least `needed` (m,), of `count` pieces. None: none was found."""
     index = np.clip((motion.times * (count / duration)).astype(int), 0, count - 1)
     needed_by_piece = np.ones(count)
     np.maximum.at(needed_by_piece, index, needed)
