@@ -70,7 +70,7 @@ class ServedControl:
         elif reduces_telemetry(frame, wanted_rates(self._config, self._link)):
             self._component.acknowledge(client, frame, ACCEPTED, self._autopilot)
         else:
-            if owner is not None and owner.client is client and leaves_control(frame):
+            if owner is not None and owner.client is client and leaves_control(frame, autopilot):
                 flight.expect_release()
             return False
         return True

@@ -77,12 +77,18 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     return message is not None and message.command in _STEERING_COMMANDS
 
 
-def leaves_control(frame: Frame) -> bool:
-    """Whether a frame gives up its sender's control: it commands a mode, a landing or a return."""
+def leaves_control(frame: Frame, autopilot: Autopilot) -> bool:
+    """Whether a frame gives up its sender's control: it commands a mode, a landing or a return.
+
+    In control, ArduPilot's GUIDED is no other mode, and some programs command it again and again.
+    """
+    our_mode = autopilot.modes[autopilot.offboard_mode]
     if frame.message_id == _SET_MODE:
-        return True
+        return bool(decode(frame.message_id, frame.payload).custom_mode != our_mode)
     message = command_in(frame)
-    return message is not None and message.command in _LEAVING_COMMANDS
+    if message is None or message.command not in _LEAVING_COMMANDS:
+        return False
+    return bool(message.command != dialect.MAV_CMD_DO_SET_MODE or message.param2 != our_mode)
 
 
 def reduces_telemetry(frame: Frame, needed: dict[str, float]) -> bool:

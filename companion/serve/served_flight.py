@@ -186,7 +186,8 @@ class ServedFlight:
 
     def _tell_end(self, command: ControlRequest | None, result: str) -> None:
         if self._source.start_pose is None:
-            self._component.tell(f"control was not given to {self._owner_name}: {result}")
+            reason = self._assembled.flight.end_reason if result == "ok" else result
+            self._component.tell(f"control was not given to {self._owner_name}: {reason}")
             self._answer(command, REJECTED)
             return
         if result == "ok":

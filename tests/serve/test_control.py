@@ -218,6 +218,32 @@ def test_a_single_setpoint_in_guided_gives_no_control():
     fly("ardupilot", scene)
 
 
+@pytest.mark.parametrize(
+    ("modes", "told"),
+    [
+        ({"script": 9}, "control was not given to program (245/190): program (245/190) commanded"),
+        ({"script": 4, "station": 9}, "control was not given to program (245/190): the pilot or"),
+    ],
+    ids=["the client lands", "a station lands"],
+)
+def test_a_takeover_that_another_mode_ends_is_told_with_who_commanded_it(modes, told):
+    """It was told as "ok"; and a client that commands GUIDED again gives up nothing."""
+
+    async def scene(vehicle, session, script, ground):
+        begin = place(session)
+        hold = lambda _: script.local(ALL, begin)  # noqa: E731
+        while session.flights.current_flight is None:
+            await stream(0.1, hold)
+        for name, mode in modes.items():
+            {"script": script, "station": ground}[name].command(176, 1, mode)
+            await stream(0.1, hold)
+        await stream(1.5, hold)
+        assert vehicle.state()["mode"] == "LAND"
+        assert told in " ".join(script.texts())
+
+    fly("ardupilot", scene)
+
+
 def test_on_the_ground_ardupilot_s_setpoints_are_refused_in_words():
     vehicle = mock("ardupilot")
 
