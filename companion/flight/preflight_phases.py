@@ -16,7 +16,7 @@ from companion.mavlink.commands import ARM, DISARM
 from companion.preflight import vehicle_checks
 from companion.preflight.evidence import Evidence, Stage
 from companion.preflight.finding import Finding
-from companion.safety.actions import Exit, FlightEnded
+from companion.safety.actions import ARMED_UNKNOWN, Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 from companion.vehicle.parameter_rules import CheckResult, Values
 
@@ -155,7 +155,11 @@ async def _arm(context: FlightContext) -> None:
     await command_if_ours(context, ARM, require_control, armed)
     await wait_until_armed(context, armed)
     if not armed():
-        await context.fresh_heartbeat()
+        try:
+            async with asyncio.timeout(INITIAL_HEARTBEAT_LIMIT):
+                await context.fresh_heartbeat()
+        except TimeoutError:
+            raise FlightEnded(ARMED_UNKNOWN) from None
     if not armed():
         raise FlightEnded(
             "the autopilot accepted arming, but reports that it is disarmed", Exit.LEAVE

@@ -11,7 +11,14 @@ from companion.flight.hold_inside import brake_inside_fence
 from companion.flight.phase import Phase
 from companion.flight.rate_requester import RateRequester
 from companion.safety import SafetyLadder
-from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded, StreamEffect
+from companion.safety.actions import (
+    ARMED_UNKNOWN,
+    EXIT_OF_ACTION,
+    Action,
+    Exit,
+    FlightEnded,
+    StreamEffect,
+)
 from companion.vehicle.autopilot import Role
 from companion.vehicle.records import is_outdated
 
@@ -163,6 +170,4 @@ class Watch:
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )
         if state.heartbeat is None or is_outdated(now - age(state.heartbeat.received), now):
-            raise FlightEnded(
-                "no heartbeat from the vehicle, so whether it is armed is not known any more", exit_
-            )
+            raise FlightEnded(ARMED_UNKNOWN, exit_)

@@ -7,6 +7,9 @@ from companion.user_code import UserCodeError
 DISARMED_IN_FLIGHT = "the vehicle disarmed in flight"
 """The words of a flight that ends because others disarmed the vehicle in the air."""
 
+ARMED_UNKNOWN = "no heartbeat from the vehicle, so whether it is armed is not known any more"
+"""The words of a flight that ends because no heartbeat tells whether the vehicle is armed."""
+
 
 class Action(Enum):
     """The actions by rising severity; the value is the word used in messages and in YAML.

@@ -17,8 +17,9 @@ class LostAnswers:
     `LATER` s after that command, `then` happens.
     """
 
-    def __init__(self, mock, begins, then, *, lost="COMMAND_ACK"):
-        self.mock, self.begins, self.then, self.lost = mock, begins, then, lost
+    def __init__(self, mock, begins, then, *, lost="COMMAND_ACK", seconds=LOST_FOR):
+        self.mock, self.begins, self.then = mock, begins, then
+        self.lost, self.seconds = lost, seconds
         self.up, self.down = dialect.MAVLink(None), dialect.MAVLink(None)
         self.began, self.sent_later = None, []
         mock.from_companion = self.from_companion
@@ -26,7 +27,7 @@ class LostAnswers:
 
     @property
     def is_losing(self):
-        return self.began is not None and self.mock.time < self.began + LOST_FOR
+        return self.began is not None and self.mock.time < self.began + self.seconds
 
     def from_companion(self, data):
         for message in self.up.parse_buffer(data) or ():
@@ -92,6 +93,17 @@ def test_a_pilot_who_disarms_before_a_heartbeat_shows_the_arming_is_told_soon():
         assert mock.state()["armed"] is False
     assert summary.result == "the autopilot accepted arming, but reports that it is disarmed"
     assert summary.events[-1][0] < 20.0
+
+
+def test_a_vehicle_of_which_no_heartbeat_shows_the_arming_is_soon_disarmed():
+    """It stood armed for a minute."""
+    with mock_vehicle() as mock:
+        arming = lambda sent: (sent.command, sent.param1) == (ARM, 1)  # noqa: E731
+        LostAnswers(mock, arming, lambda: None, lost="HEARTBEAT", seconds=8.0)
+        summary = fly(mock)
+        assert mock.state()["armed"] is False
+    assert summary.result.startswith("no heartbeat from the vehicle, so whether it is armed")
+    assert summary.phase == "arm"
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
