@@ -1,11 +1,15 @@
 """Tells from landed flag, height, speed and commands whether the vehicle stands on the ground."""
 
 from collections.abc import Callable
+from math import inf
 
 from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 
 _STILL_SPEED = 0.5
 """Largest estimated vertical speed of a vehicle on the ground, m/s."""
+_IMPACT_SPEED, _IMPACT_TIME = 3.0, 0.25
+"""A vehicle that sank faster than this, m/s, and is still within this time, s, hit the ground: no
+autopilot brakes its landing so hard."""
 _LIFT_OFF_HEIGHT = 1.0
 """Climb since the take-off command, m, above which the vehicle counts as lifted off."""
 _MAX_SPEED_AGE = 0.5
@@ -26,10 +30,12 @@ class GroundContact:
     Attributes:
         takeoff_commanded: whether a take-off was commanded in this flight, or the vehicle already
             flew. If so, no setpoint may have zero thrust.
+        has_hit_ground: whether the vehicle hit the ground hard in its landing.
     """
 
     def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:
-        self.takeoff_commanded = False
+        self.takeoff_commanded = self.has_hit_ground = False
+        self._sank_fast_at = -inf
         self._state, self._clock = state, clock
         self._start_height: float | None = None
         self._has_left_ground = False
@@ -53,6 +59,14 @@ class GroundContact:
             self._landed_since = self._clock()
         if self.takeoff_commanded and (state.flying or self._has_climbed()):
             self._has_left_ground = True
+
+    def note_landing(self) -> None:
+        """Look for an impact; to be called at least 50 times a second while the vehicle lands."""
+        speed, now = self._vertical_speed(), self._clock()
+        if speed > _IMPACT_SPEED:
+            self._sank_fast_at = now
+        elif abs(speed) < _STILL_SPEED and now - self._sank_fast_at < _IMPACT_TIME:
+            self.has_hit_ground = True
 
     @property
     def may_idle(self) -> bool:

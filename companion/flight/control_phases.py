@@ -203,13 +203,15 @@ async def disarm(context: FlightContext) -> None:
 
 
 def _require_upright(context: FlightContext) -> None:
-    """Raise `FlightEnded` if the vehicle that has landed lies on its side or on its back."""
+    """Raise `FlightEnded` if the vehicle fell in its landing, or lies on its side or its back."""
     tilt = context.tilt()
     if tilt is not None and tilt > _UPRIGHT_TILT:
         raise FlightEnded(
             f"the vehicle lies tilted by {degrees(tilt):.0f}° after the landing: it tipped over or "
             "crashed"
         )
+    if context.ground.has_hit_ground:
+        raise FlightEnded("the vehicle hit the ground hard: it fell in its landing or crashed")
 
 
 def _require_landing(context: FlightContext) -> None:

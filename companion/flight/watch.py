@@ -66,6 +66,7 @@ class Watch:
         self._context.replacement_detector.update()
         self._context.replacement_detector.require()
         if phase.lands:  # also while its command is not answered: a fall is soon over
+            self._context.ground.note_landing()
             require_not_falling(self._context)
         in_control = phase.monitored and self._context.loop.offboard_active
         if in_control and self._context.link.state.armed is False:

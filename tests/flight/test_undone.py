@@ -106,16 +106,23 @@ def test_a_vehicle_of_which_no_heartbeat_shows_the_arming_is_soon_disarmed():
     assert summary.phase == "arm"
 
 
+IN_THE_AIR = "the pilot, the autopilot or another station disarmed the vehicle in the air"
+HARD = "the vehicle hit the ground hard: it fell in its landing or crashed"
+
+
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-def test_a_vehicle_killed_before_the_landing_is_answered_did_not_land_well(autopilot):
-    """The fall was over when the next try of the command looked for its effect."""
+@pytest.mark.parametrize(
+    ("lost", "told"),
+    [("COMMAND_ACK", f"{IN_THE_AIR} during the landing, and it fell"), ("HEARTBEAT", HARD)],
+    ids=["answers", "heartbeats"],
+)
+def test_a_vehicle_killed_as_its_landing_begins_did_not_land_well(autopilot, lost, told):
+    """The fall was over before it was looked for, and the flight was called good."""
     with mock_vehicle(autopilot=autopilot) as mock:
 
         def is_landing(sent):
             return sent.command == LAND or (sent.command, sent.param2) == (SET_MODE, 9)
 
-        LostAnswers(mock, is_landing, lambda: mock.command(*KILL))
+        LostAnswers(mock, is_landing, lambda: mock.command(*KILL), lost=lost)
         summary = fly(mock, hover={"duration_s": 0.5})
-    assert summary.result.endswith(
-        "disarmed the vehicle in the air during the landing, and it fell"
-    )
+    assert summary.result == told, summary.events
