@@ -1,25 +1,23 @@
 """Corrects the estimated height and vertical speed, which contradict each other."""
 
-from math import exp
 from typing import NamedTuple
 
 from companion.attitude.rotation import clamp
 
 _BIAS_BANDWIDTH = 0.5
-"""Both poles of the filter of the bias, rad/s: slower than the height hold, quicker than a lap of a
-circle."""
+"""Bandwidth of the observer that corrects the speed, rad/s: slower than the height hold, quicker
+than a lap of a circle."""
+_CORRECTION_BANDWIDTH = 2.0
+"""Bandwidth of the observer that corrects the height, rad/s."""
 _LARGEST_BIAS = 0.15
-"""The learned bias is clamped to ± this, m/s."""
+"""An observed error of the speed is clamped to ± this, m/s."""
 _ESTIMATOR_TIME = 1.2
 """Time constant with which the estimator corrects its height, s. The true heights of 54 flights fit
 1.0 s on ArduPilot and 1.5 s on PX4."""
-_FILTER_TIME = 0.3
-"""Time constant of each of the two low-pass filters of r (see `VerticalCorrection`), s."""
-_LARGEST_R_CHANGE = 0.3
-"""Each new value of r is clamped to within ± this of the filtered r, m/s: a jump of the height is
-no correction by the estimator."""
 _LARGEST_CORRECTION = 0.1
 """Largest correction of the height, m; the largest one in recorded flights was 0.08 m."""
+_SMALLEST_JUMP = 0.15
+"""A height that differs by more than this from the prediction has jumped, m: that is no motion."""
 _LONGEST_GAP = 0.5
 """Longest time between two positions that are compared, s."""
 
@@ -41,19 +39,18 @@ class VerticalCorrection:
 
     The autopilot's Kalman filter moves its height by its vertical speed, and towards the measured
     height. The motion towards the measured height is the change that the speed does not explain:
-    r = ż − v. It is the distance to the measured height divided by the estimator's time constant.
-    So the distance is that time constant times r, and is added to the height.
-
-    Attributes:
-        bias: reported minus true vertical speed, m/s, positive down.
+    ż − v. It is the distance to the measured height divided by the estimator's time constant. So
+    the distance is that time constant times ż − v, and is added to the height.
     """
 
     def __init__(self) -> None:
-        self.bias = 0.0
-        self._time = 0.0
-        self._reported: VerticalMotion | None = None
-        self._predicted_down = 0.0
-        self._half_filtered_r = self._filtered_r = 0.0
+        self._bias = _SpeedErrorObserver(_BIAS_BANDWIDTH)
+        self._correction = _SpeedErrorObserver(_CORRECTION_BANDWIDTH)
+
+    @property
+    def bias(self) -> float:
+        """Reported minus true vertical speed, m/s, positive down."""
+        return self._bias.error
 
     def corrected(self, time: float, reported: VerticalMotion) -> VerticalMotion:
         """Take a reported height and speed; return them corrected.
@@ -62,25 +59,41 @@ class VerticalCorrection:
             time: vehicle time of `reported`, s.
             reported: the autopilot's estimate.
         """
-        dt, last = time - self._time, self._reported
-        self._time, self._reported = time, reported
-        if last is None or not 0.0 < dt < _LONGEST_GAP:
-            self._predicted_down = reported.down
-        else:
-            mean_speed = 0.5 * (last.speed + reported.speed)
-            self._learn_bias(dt, reported.down, mean_speed)
-            self._filter_r(dt, (reported.down - last.down) / dt - mean_speed)
-        correction = clamp(_ESTIMATOR_TIME * self._filtered_r, _LARGEST_CORRECTION)
-        return VerticalMotion(reported.down + correction, reported.speed - self.bias)
+        self._bias.observe(time, reported)
+        self._correction.observe(time, reported)
+        correction = clamp(-_ESTIMATOR_TIME * self._correction.error, _LARGEST_CORRECTION)
+        return VerticalMotion(reported.down + correction, reported.speed - self._bias.error)
 
-    def _learn_bias(self, dt: float, down: float, mean_speed: float) -> None:
-        predicted_down = self._predicted_down + dt * (mean_speed - self.bias)
-        error = down - predicted_down
-        self._predicted_down = predicted_down + min(2.0 * _BIAS_BANDWIDTH * dt, 1.0) * error
-        self.bias = clamp(self.bias - _BIAS_BANDWIDTH**2 * dt * error, _LARGEST_BIAS)
 
-    def _filter_r(self, dt: float, new_r: float) -> None:
-        new_weight = 1.0 - exp(-dt / _FILTER_TIME)
-        change = clamp(new_r - self._half_filtered_r, _LARGEST_R_CHANGE)
-        self._half_filtered_r += new_weight * change
-        self._filtered_r += new_weight * (self._half_filtered_r - self._filtered_r)
+class _SpeedErrorObserver:
+    """Observes the error of a speed by comparing its integral with the position.
+
+    Both poles of the observer are at `bandwidth`, rad/s.
+
+    Attributes:
+        error: speed minus change of the position, m/s.
+    """
+
+    def __init__(self, bandwidth: float) -> None:
+        self.error = 0.0
+        self._bandwidth = bandwidth
+        self._time = 0.0
+        self._speed = 0.0
+        self._down: float | None = None
+
+    def observe(self, time: float, reported: VerticalMotion) -> None:
+        """Take a position and speed that belong to `time`, s."""
+        dt, down = time - self._time, self._down
+        mean_speed = 0.5 * (self._speed + reported.speed)
+        self._time, self._speed = time, reported.speed
+        if down is None or not 0.0 < dt < _LONGEST_GAP:
+            self._down = reported.down
+            return
+        predicted_down = down + dt * (mean_speed - self.error)
+        position_error = reported.down - predicted_down
+        if abs(position_error) > _SMALLEST_JUMP:
+            self._down = reported.down
+            return
+        bandwidth = self._bandwidth
+        self._down = predicted_down + min(2.0 * bandwidth * dt, 1.0) * position_error
+        self.error = clamp(self.error - bandwidth**2 * dt * position_error, _LARGEST_BIAS)
