@@ -66,13 +66,13 @@ class EkfConfig(Section):
     sink_per_acceleration_ms: Finite = 4.0
     """Error of the vertical velocity (estimated minus true, down) per horizontal acceleration. The
     error follows the acceleration over seconds; the position has no such error."""
-    sink_noise_m_s: NonNegative = 0.018
+    sink_noise_m_s: NonNegative = 0.015
     """Standard deviation of a slow noise of the vertical velocity; the position integrates it."""
     sink_noise_time_s: Positive = 2.0
     """Correlation time of the slow noise of the vertical velocity."""
     height_time_s: Annotated[float, Field(ge=0.5)] = 2.0
     """Time constant with which the estimated height follows the measured height."""
-    height_noise_m: NonNegative = 0.02
+    height_noise_m: NonNegative = 0.017
     """Standard deviation of a slow noise of the measured height, like that of a barometer."""
     height_noise_time_s: Positive = 6.0
     """Correlation time of the slow noise of the measured height."""
@@ -118,9 +118,9 @@ EKFS: dict[str, EkfConfig | None] = {
         height_offset_m=0.1,
         height_sag_s4_per_m=0.0001,
         sink_per_acceleration_ms=0.0,
-        sink_noise_m_s=0.008,
+        sink_noise_m_s=0.006,
         height_time_s=1.1,
-        height_noise_m=0.008,
+        height_noise_m=0.0065,
         position_gains=(0.0367, 0.1088),
         velocity_gains=(0.116, 0.1706),
         acceleration_gains=(0.0082, 0.0323),
