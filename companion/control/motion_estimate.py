@@ -14,10 +14,10 @@ from companion.guidance import (
     ObserverSettings,
     VehicleMotion,
 )
-from companion.guidance.climb_bias import ClimbBias
 from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.guidance.reference import NorthEast
+from companion.guidance.vertical_correction import VerticalCorrection, VerticalMotion
 from companion.nmpc import VehicleSnapshot
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
@@ -53,7 +53,7 @@ class MotionEstimate:
         self.drag = drag
         self._clock_offset = clock_offset
         self._slopes = SlopeHistory()
-        self._climb_bias = ClimbBias()
+        self._vertical_correction = VerticalCorrection()
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
@@ -105,12 +105,11 @@ class MotionEstimate:
             return
         slope_start = position.vehicle_time if previous is None else previous.vehicle_time
         slope = self._slopes.mean(slope_start, position.vehicle_time)
-        north, east, down = position.velocity_ned
-        down = self._climb_bias.corrected_speed(
-            position.vehicle_time, position.position_ned[2], down
-        )
+        time, (north, east, down) = position.vehicle_time, position.position_ned
+        v_north, v_east, v_down = position.velocity_ned
+        down, v_down = self._vertical_correction.corrected(time, VerticalMotion(down, v_down))
         measured_motion = self._correction.corrected_motion(
-            position.vehicle_time, VehicleMotion(position.position_ned, (north, east, down))
+            time, VehicleMotion((north, east, down), (v_north, v_east, v_down))
         )
         modelled_acceleration = self._modelled_acceleration(slope, measured_motion)
         self._observer.observe(

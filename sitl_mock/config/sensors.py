@@ -62,16 +62,20 @@ class EkfConfig(Section):
     height_offset_m: Finite = 0.0
     """Constant error of the height: true minus estimated."""
     height_sag_s4_per_m: Finite = 0.0009
-    """Error of the height (true minus estimated) per squared horizontal acceleration. The error
-    follows the acceleration over seconds."""
+    """Error of the measured height (true minus measured) per squared horizontal acceleration."""
     sink_per_acceleration_ms: Finite = 4.0
     """Error of the vertical velocity (estimated minus true, down) per horizontal acceleration. The
     error follows the acceleration over seconds; the position has no such error."""
-    height_noise_m: NonNegative = 0.036
-    """Standard deviation of a slow noise, like that of a barometer. The error of the estimated
-    height follows the noise with a time constant of 2 s."""
+    sink_noise_m_s: NonNegative = 0.015
+    """Standard deviation of a slow noise of the vertical velocity; the position integrates it."""
+    sink_noise_time_s: Positive = 2.0
+    """Correlation time of the slow noise of the vertical velocity."""
+    height_time_s: Annotated[float, Field(ge=0.5)] = 2.0
+    """Time constant with which the estimated height follows the measured height."""
+    height_noise_m: NonNegative = 0.017
+    """Standard deviation of a slow noise of the measured height, like that of a barometer."""
     height_noise_time_s: Positive = 6.0
-    """Correlation time of the slow noise of the height."""
+    """Correlation time of the slow noise of the measured height."""
     position_gains: InnovationGains = (0.0774, 0.0494)
     """Gains of the position for an innovation of position and velocity, m per m and m per m/s."""
     velocity_gains: InnovationGains = (0.0316, 0.0411)
@@ -112,10 +116,11 @@ EKFS: dict[str, EkfConfig | None] = {
         acceleration_scale=0.0007,
         vertical_share=0.6,
         height_offset_m=0.1,
-        height_sag_s4_per_m=0.0004,
+        height_sag_s4_per_m=0.0001,
         sink_per_acceleration_ms=0.0,
-        height_noise_m=0.014,
-        height_noise_time_s=6.0,
+        sink_noise_m_s=0.006,
+        height_time_s=1.1,
+        height_noise_m=0.0065,
         position_gains=(0.0367, 0.1088),
         velocity_gains=(0.116, 0.1706),
         acceleration_gains=(0.0082, 0.0323),

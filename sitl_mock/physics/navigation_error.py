@@ -6,6 +6,7 @@ Horizontal vectors are complex numbers, north + j east. The functions can be com
 from math import exp
 from typing import NamedTuple
 
+from sitl_mock.physics.height_error import HeightError
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.rigid_body import GRAVITY, Motion
 
@@ -44,9 +45,7 @@ class FilterState(NamedTuple):
     yaw: float  # heading error, rad
     pending_yaw: float  # part of `yaw` that the output does not yet contain, rad
     noiseless_yaw: float  # heading error without its noise, rad
-    down_error: float  # slow error of the down position, m
-    sink_error: float  # slow error of the down velocity, m/s
-    height_noise: float  # slow noise that the height follows, m
+    height: HeightError
     fused_at: float  # fusion time of the fix, s
     corrected_at: float  # time at which the fix corrected the errors, s
     position: complex  # true position at the fusion time, m
@@ -134,13 +133,16 @@ def error_at(
     velocity += constants.lead_time * complex(truth[13], truth[14]) - pending_fraction * pending[1]
     down, sink_rate, _ = propagated_vertical_errors(constants, state, truth, elapsed)
     pending = state.vertical.pending_corrections
-    down += constants.height_offset + state.down_error - pending_fraction * pending[0]
+    height = state.height
+    slow_down = height.down + height.down_rate * (now - state.corrected_at)
+    down += constants.height_offset + slow_down - pending_fraction * pending[0]
+    slow_sink = height.sink_by_acceleration + height.sink_noise
     return ErrorVectors(
         (position.real, position.imag, down.real),
         (
             velocity.real,
             velocity.imag,
-            (sink_rate - pending_fraction * pending[1]).real + state.sink_error,
+            (sink_rate - pending_fraction * pending[1]).real + slow_sink,
         ),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (

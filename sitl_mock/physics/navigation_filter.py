@@ -10,6 +10,7 @@ from math import exp, radians, sqrt
 from random import Random
 
 from sitl_mock.config.sensors import EkfConfig
+from sitl_mock.physics.height_error import HeightErrorModel
 from sitl_mock.physics.navigation_error import (
     ErrorConstants,
     Errors,
@@ -22,8 +23,6 @@ from sitl_mock.physics.navigation_error import (
 )
 from sitl_mock.physics.rigid_body import GRAVITY
 
-_SLOW_ERROR_TIME_S = 2.0
-"""Time constant with which errors of height and vertical speed follow the acceleration, s."""
 _MIN_COURSE_SPEED = 0.5
 """Smallest speed for which the turn rate of the course is computed, m/s; the course of a slower
 vehicle would seem to turn infinitely fast."""
@@ -64,15 +63,15 @@ class NavigationFilter:
         )
         self._uncertainty = _MAX_UNCERTAINTY
         self._random = Random(f"{seed}/navigation")
-        self._height_random = Random(f"{seed}/height")
+        self._height_model = HeightErrorModel(config, seed)
         self._slip_phase = Random(f"{seed}/slip").random()
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
         horizontal = self._initial_errors(1.0)
         vertical = self._initial_errors(config.vertical_share)
         position, velocity = complex(start[10], start[11]), complex(start[0], start[1])
-        noise = self._height_random.gauss(0.0, config.height_noise_m)
+        height = self._height_model.initial()
         self.state = FilterState(
-            horizontal, vertical, yaw, 0.0, 0.0, noise, 0.0, noise, 0.0, 0.0, position, velocity
+            horizontal, vertical, yaw, 0.0, 0.0, height, 0.0, 0.0, position, velocity
         )
 
     def _initial_errors(self, ratio: float) -> ErrorState:
@@ -114,17 +113,15 @@ class NavigationFilter:
         yaw = self._next_yaw_noise() + noiseless_yaw
         yaw_fraction = pending_correction_fraction(constants.heading_predictor_ms, state, now)
         pending_yaw = yaw_fraction * state.pending_yaw + yaw - state.yaw
-        height_noise = self._next_height_noise(elapsed)
-        down_error, sink_error = self._next_slow_errors(abs(acceleration), height_noise, elapsed)
+        since_correction = now - state.corrected_at
+        height = self._height_model.next(state.height, abs(acceleration), since_correction)
         corrected = FilterState(
             horizontal,
             vertical,
             yaw,
             pending_yaw,
             noiseless_yaw,
-            down_error,
-            sink_error,
-            height_noise,
+            height,
             fused_at,
             now,
             complex(fused[10], fused[11]),
@@ -177,22 +174,6 @@ class NavigationFilter:
         uncertainty = self._uncertainty / (1.0 + fix_correction_rate * elapsed)
         self._uncertainty = min(uncertainty + _UNCERTAINTY_GROWTH * elapsed, _MAX_UNCERTAINTY)
         return steady_error + (self.state.noiseless_yaw - steady_error) * exp(-total_rate * elapsed)
-
-    def _next_slow_errors(
-        self, acceleration: float, height_noise: float, elapsed: float
-    ) -> tuple[float, float]:
-        """Return the slow errors of the down position (m) and velocity (m/s) at the next fix."""
-        config, down, sink = self._config, self.state.down_error, self.state.sink_error
-        down_error = config.height_sag_s4_per_m * acceleration**2 + height_noise
-        sink_error = config.sink_per_acceleration_ms * 1e-3 * acceleration
-        fraction = 1.0 - exp(-elapsed / _SLOW_ERROR_TIME_S)
-        return down + fraction * (down_error - down), sink + fraction * (sink_error - sink)
-
-    def _next_height_noise(self, elapsed: float) -> float:
-        """Return the slow noise of the height at the next fix, m."""
-        config, decay = self._config, exp(-elapsed / self._config.height_noise_time_s)
-        sigma = config.height_noise_m * sqrt(1.0 - decay * decay)
-        return decay * self.state.height_noise + self._height_random.gauss(0.0, sigma)
 
     def _next_noise(self, noise: tuple[complex, complex], ratio: float) -> tuple[complex, complex]:
         """Return the noise of the next fix: the configured noise times `ratio`."""

@@ -6,6 +6,7 @@ from random import Random
 from typing import NamedTuple
 
 from sitl_mock.config.sensors import SensorConfig
+from sitl_mock.physics.height_error import HeightError
 from sitl_mock.physics.navigation_error import (
     ErrorConstants,
     ErrorState,
@@ -29,7 +30,16 @@ from sitl_mock.physics.quaternion import (
 NO_ERRORS = ErrorVectors((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _NO_ERROR_STATE = ErrorState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
 _NO_FILTER = FilterState(
-    _NO_ERROR_STATE, _NO_ERROR_STATE, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j
+    _NO_ERROR_STATE,
+    _NO_ERROR_STATE,
+    0.0,
+    0.0,
+    0.0,
+    HeightError(0.0, 0.0, 0.0, 0.0, 0.0),
+    0.0,
+    0.0,
+    0j,
+    0j,
 )
 _ESTIMATES_PER_DRAW = 16
 """Number of estimates for which noise is drawn at a time; even, as normal numbers come in pairs."""

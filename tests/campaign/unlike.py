@@ -42,6 +42,7 @@ _FILTER_NOISE = (
     "tilt_noise_deg",
     "yaw_error_deg",
     "height_noise_m",
+    "sink_noise_m_s",
 )
 
 

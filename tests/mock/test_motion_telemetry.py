@@ -45,7 +45,9 @@ def test_the_magnetic_field_is_in_the_body_frame(roll, pitch, heading):
 
 
 def test_the_altitude_of_the_terrain_has_the_error_of_the_estimated_height():
-    rig = Rig(sensors={"ekf": {"height_offset_m": 0.5, "height_noise_m": 0.0}})
+    rig = Rig(
+        sensors={"ekf": {"height_offset_m": 0.5, "height_noise_m": 0.0, "sink_noise_m_s": 0.0}}
+    )
     rig.take_off(4.0)
     rig.run(3.0)
     altitude, height = rig.messages("ALTITUDE")[-1], -rig.truth.position_ned[2]

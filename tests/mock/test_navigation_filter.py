@@ -80,6 +80,7 @@ def without_noise(name, yaw_deg):
             "velocity_noise_m_s": 0.0,
             "tilt_noise_deg": 0.0,
             "height_noise_m": 0.0,
+            "sink_noise_m_s": 0.0,
             "yaw_time_s": 1e12,
             "yaw_error_deg": 1.0,
             "compass_error_deg": 0.0,
@@ -110,7 +111,13 @@ def test_errors_in_motion_are_those_measured(name, way, axis, w, yaw_deg, place,
 
 
 def quiet(name):
-    noise = "position_noise_m", "velocity_noise_m_s", "tilt_noise_deg", "height_noise_m"
+    noise = (
+        "position_noise_m",
+        "velocity_noise_m_s",
+        "tilt_noise_deg",
+        "height_noise_m",
+        "sink_noise_m_s",
+    )
     silent = dict.fromkeys((*noise, "yaw_error_deg"), 0.0)
     return EKFS[name].model_copy(update=silent)
 
