@@ -61,6 +61,12 @@ def test_each_doublet_turns_back_and_ends_with_a_rest(rates):
         assert not at_rest.any()
 
 
+def test_each_part_of_a_doublet_begins_at_its_first_moment():
+    """+A, −A, +A, rest; the maneuver begins with 1.5 s of hold, and T is 0.25 s: exact in binary."""
+    rolls = [DOUBLETS.at(1.5 + time, START).body_rates.roll for time in (0.0, 0.25, 0.75, 1.0)]
+    assert rolls == [0.5, -0.5, 0.5, 0.0]
+
+
 def test_position_is_held_before_each_doublet_and_at_the_end(rates, references):
     parts = open_loop_parts(rates)
     assert TIMES[parts[0][0]] == pytest.approx(DOUBLETS.settle_time, abs=2 * STEP)

@@ -92,6 +92,19 @@ def test_in_a_figure_eight_a_late_position_is_made_up_for(filter_time, period):
     assert off[knowing] <= (0.25 if filter_time < 0.05 else 0.4) * position_delay * 8.0
 
 
+def test_north_and_east_are_corrected_alike_and_down_is_left_alone():
+    late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.02, output_delay=0.1)
+    northwards, eastwards = PositionCorrection(late), PositionCorrection(late)
+    for time, _, ((north, east, down), (speed, _, _)) in wandering(2.0, position_delay=0.02):
+        sinking = 0.5 + time
+        there = VehicleMotion((north, east, down), (speed, -1.0, sinking))
+        swapped = VehicleMotion((east, north, down), (-1.0, speed, sinking))
+        (n, e, d), velocity = northwards.corrected_motion(time, there)
+        assert velocity == there.velocity_ned
+        assert d == down
+        assert eastwards.corrected_motion(time, swapped).position_ned == (e, n, d)
+
+
 def test_other_settings_count_from_the_next_position_on():
     late = CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.02, output_delay=0.0)
     retuned, kept = PositionCorrection(SETTINGS), PositionCorrection(SETTINGS)

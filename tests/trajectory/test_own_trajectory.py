@@ -84,6 +84,19 @@ def test_good_trajectories_fit_themselves(trajectory):
     require_trajectory(trajectory)
 
 
+def test_messages_and_the_record_name_a_trajectory_by_its_shape():
+    named = {
+        "line": line((3.0, 1.0, -1.0), 2.0, 2.0, 4.0),
+        "circle": circle(5.0, LAPS),
+        "helix": helix(4.0, 1.0, LAPS),
+        "gerono eight": gerono_eight(3.0, LAPS),
+        "bernoulli eight": bernoulli_eight(3.0, LAPS),
+        "waypoints": waypoints(POINTS, 3.0, 2.0),
+        "straight legs": straight_legs(POINTS, 3.0, 2.0, 4.0),
+    }
+    assert [each.name for each in named.values()] == list(named)
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
