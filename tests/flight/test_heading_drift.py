@@ -1,11 +1,7 @@
 """A heading that turns while the vehicle does not, as by a disturbed compass."""
 
-from math import cos, degrees, radians, sin
-from types import SimpleNamespace
+from math import cos, radians, sin
 
-import pytest
-
-from companion.safety.heading_drift import HeadingDrift
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When, change_messages
 
@@ -36,24 +32,3 @@ def test_a_heading_that_turns_alone_lands_the_vehicle_before_it_flies_away():
     assert truth["on_ground"]
     assert not truth["crashed"]
     assert summary.tracking()["position_max_m"] < 0.5
-
-
-@pytest.mark.parametrize(
-    ("drift", "turn", "seconds", "counted"),
-    [
-        (35.0, 0.0, 10.0, 35.0),
-        (-35.0, 0.0, 10.0, 35.0),
-        (35.0, 0.0, 100.0, 7.0),  # an error of the gyro that is constant
-        (50.0, 1000.0, 20.0, 0.0),  # a scale error of the gyro in a fast turn
-    ],
-)
-def test_errors_of_a_gyro_are_no_drift(drift, turn, seconds, counted):
-    resets = SimpleNamespace()
-    heading, steps = HeadingDrift(resets), 100
-    for k in range(steps + 1):
-        resets.heading_corrections = radians(drift) * k / steps
-        resets.total_turn = radians(turn) * k / steps
-        newest = heading.drift(seconds * k / steps)
-    assert degrees(newest) == pytest.approx(counted, abs=1e-6)
-    heading.begin()
-    assert heading.drift(seconds + 1.0) == 0.0
