@@ -1,6 +1,7 @@
 """The hold with weights that follow from the vehicle's delay: how wrong what it believes may be."""
 
 from itertools import product
+from math import degrees
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from companion.control.hold_settings import (
     disturbance_bandwidth,
     hold_weights,
     observer_settings,
+    slewing_delay,
 )
 from companion.control.retuning import loop_settings
 from companion.files import bounded_yaml
@@ -74,6 +76,25 @@ def test_the_weights_follow_from_the_delay_and_explicit_ones_win():
     weights = hold_weights(told)
     assert (weights.position, weights.velocity) == (150.0, 8.0)
     assert disturbance_bandwidth(told) == 7.0
+
+
+@pytest.mark.parametrize(
+    ("roll_s", "pitch_s", "delay", "stiffness"),
+    [(0.06, 0.06, 0.03, 1.0), (0.04, 0.09, 0.045, 0.5), (0.2, 0.04, 0.1, 0.0)],
+)
+def test_a_rate_loop_that_slews_slowly_has_a_hold_less_stiff(roll_s, pitch_s, delay, stiffness):
+    """By hand: half the time to the largest rate about the slower axis, and 27.5 ms without it."""
+    quick = believed(20.0, 17.5)
+    assert slewing_delay(quick) == 0.0
+    rate = degrees(quick.limits.max_tilt_rate)
+    limits = {
+        "acceleration_limit_deg_s2": rate / roll_s,
+        "pitch_acceleration_limit_deg_s2": rate / pitch_s,
+    }
+    slow = changed(quick, {"vehicle": limits}, "test")
+    assert slewing_delay(slow) == pytest.approx(delay)
+    ratio = hold_weights(slow).position / hold_weights(slow).velocity ** 2
+    assert ratio == pytest.approx(1.0 + stiffness)
 
 
 def test_only_a_quick_rate_loop_has_a_quick_observer():
