@@ -29,9 +29,10 @@ class Tumbling:
     def __init__(self, dt=0.01):
         self.resets, self.dt, self.time = EstimatorResets(), dt, 5.0
         self.rotation, self.rates = Rotation.from_euler("xy", (0.3, -0.4)), np.zeros(3)
+        self.yaw_rate = 1.0
 
     def step(self, jump=None):
-        rates = np.array([sin(9.0 * self.time), cos(7.0 * self.time), 1.0])
+        rates = np.array([sin(9.0 * self.time), cos(7.0 * self.time), self.yaw_rate])
         self.rotation *= Rotation.from_rotvec(0.5 * self.dt * (self.rates + rates))
         self.rates, self.time = rates, self.time + self.dt
         if jump is not None:
@@ -61,6 +62,20 @@ def test_jumps_in_heading_add_up_the_short_way_and_the_attitude_goes_on_without_
     assert body.resets.frame.attitude(quaternion(body.rotation)) == pytest.approx(
         quaternion(before)
     )
+
+
+def test_turns_about_the_z_axis_add_up_in_either_direction_and_jumps_do_not():
+    """1 s at 1 rad/s, 1 s back: a gyro with a scale error is wrong by its share of both."""
+    body = Tumbling()
+    for yaw_rate in (1.0, -1.0):
+        body.yaw_rate = yaw_rate
+        for _ in range(100):
+            body.step()
+    assert body.resets.total_turn == pytest.approx(2.0, abs=0.03)
+    assert body.resets.heading_corrections == pytest.approx(0.0, abs=0.01)
+    before = body.resets.total_turn
+    body.step(turn(0.5))
+    assert body.resets.total_turn == before
 
 
 def test_a_jump_of_the_thrust_axis_is_no_turn():
