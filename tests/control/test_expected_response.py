@@ -97,8 +97,10 @@ def test_the_largest_sensible_gain_and_a_warning_above_it():
     unknown = expected_response(Config())
     assert unknown.largest_gain is None
     assert unknown.shortest_time_constant is None
-    assert "would give" not in unknown.sentence()
-    assert "not known before `companion identify`" in unknown.gain_sentence()
+    assert "no rate limit" not in unknown.sentence()
+    assert unknown.gain_sentence() == (
+        "the largest sensible gain is not known before `companion identify`"
+    )
 
 
 def test_the_words_about_a_response():
