@@ -158,6 +158,12 @@ def test_the_path_and_its_heading_are_the_same_and_the_derivatives_right(name):
     assert copy.at(1.7) == after.at(1.7)
 
 
+@pytest.mark.parametrize(("name", "longest"), [("eight", 38.0), ("fast line", 7.6)])
+def test_short_pieces_are_slowed_again_where_they_still_break_a_limit(name, longest):
+    """Longer pieces, which keep the limits at once, would take 43.7 and 7.9 s."""
+    assert slowed(name).duration <= longest
+
+
 def test_two_corners_are_slowed_down_and_the_legs_are_not():
     found = slow_down(ANGULAR, ENVELOPE)
     assert not found.is_even
