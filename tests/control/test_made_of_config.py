@@ -247,6 +247,8 @@ def test_predictive_control():
     assert (made.min_thrust, made.max_thrust) == thrust_limits(CONFIG)
     assert (made.lead, made.deadline) == (0.025, 0.025)
     assert predictive_settings(CONFIG, vehicle_waits=True).deadline == 1.0
+    unknown = CONFIG.model_copy(update={"vehicle": Config().vehicle})
+    assert predictive_settings(unknown).lag == 0.25 / 4.0  # critical damping
     slow = CONFIG.vehicle.model_copy(update={"lag_ms": 5.0, "pitch_lag_ms": 5.0})
     with pytest.raises(ConfigError, match=r"^guidance.kind: nmpc does not work .*lag must be"):
         predictive_settings(CONFIG.model_copy(update={"vehicle": slow}))
