@@ -67,6 +67,19 @@ def test_each_part_of_a_doublet_begins_at_its_first_moment():
     assert rolls == [0.5, -0.5, 0.5, 0.0]
 
 
+def test_the_times_to_check_cover_each_doublet_with_its_rest_and_the_end():
+    times = np.array(DOUBLETS.check_times())
+    assert times[[0, -1]].tolist() == [0.0, DOUBLETS.duration]
+    begin, covered = 0.0, np.zeros(times.size - 2, bool)
+    for duration in (1.5, 1.5, 1.5, 1.5, 5.3, 5.3, 1.2, 1.2, 1.2):  # by hand
+        begin += 1.5
+        inside = (times[1:-1] >= begin - 1e-9) & (times[1:-1] <= begin + duration + 1e-9)
+        assert times[1:-1][inside][[0, -1]] == pytest.approx((begin, begin + duration))
+        assert np.diff(times[1:-1][inside]).max() < 0.0101
+        begin, covered = begin + duration, covered | inside
+    assert covered.all()
+
+
 def test_position_is_held_before_each_doublet_and_at_the_end(rates, references):
     parts = open_loop_parts(rates)
     assert TIMES[parts[0][0]] == pytest.approx(DOUBLETS.settle_time, abs=2 * STEP)
