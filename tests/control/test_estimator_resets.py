@@ -64,6 +64,15 @@ def test_jumps_in_heading_add_up_the_short_way_and_the_attitude_goes_on_without_
     )
 
 
+def test_an_attitude_that_is_no_unit_quaternion_is_passed_over():
+    body = Tumbling()
+    body.step()
+    before = body.resets.newest_attitude
+    broken = AttitudeSample(0, 5.1, 5.1, 0, (0.0, 0.0, 0.0, 0.0), before.body_rates)
+    assert body.resets.on_attitude(broken) is False
+    assert body.resets.newest_attitude is before
+
+
 def test_turns_about_the_z_axis_add_up_in_either_direction_and_jumps_do_not():
     """1 s at 1 rad/s, 1 s back: a gyro with a scale error is wrong by its share of both."""
     body = Tumbling()

@@ -99,6 +99,16 @@ def test_a_circle_is_followed_without_lag():
     assert np.hypot(*flown(late, circling, 12.0)[-3000:].T).max() >= 0.2
 
 
+def test_thrust_wind_and_both_drags_add_up_to_the_acceleration():
+    """By hand, at 5 m/s: 0.5·v and 0.1·(|v_i| − 0.85·5)·v_i along north and east."""
+    motion = VehicleMotion(REST, (3.0, 4.0, 1.0))
+    wind = (0.5, -0.25)
+    inputs = GuidanceInput(motion, motion, (1.0, 2.0), wind, Drag(0.5), THRUST, AxisDrag(0.1))
+    drag = (1.5 - 0.375, 2.0 - 0.1)
+    assert inputs.deceleration(motion.velocity_ned) == pytest.approx(drag, abs=0.005)
+    assert inputs.acceleration == pytest.approx((1.5 - drag[0], 1.75 - drag[1]), abs=0.005)
+
+
 def test_drag_along_the_axes_is_fed_forward():
     has = AxisDrag(0.06, 0.4)
     known, unknown = (
