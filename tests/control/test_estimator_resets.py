@@ -73,6 +73,18 @@ def test_an_attitude_that_is_no_unit_quaternion_is_passed_over():
     assert body.resets.newest_attitude is before
 
 
+@pytest.mark.parametrize("later", [0.0, -0.004, 0.11])
+def test_attitudes_of_one_time_of_an_earlier_one_or_far_apart_tell_no_jump(later):
+    body = Tumbling()
+    body.step()
+    newest = body.resets.newest_attitude
+    turned = newest._replace(
+        vehicle_time=newest.vehicle_time + later, q=quaternion(turn(1.0) * body.rotation)
+    )
+    assert body.resets.on_attitude(turned) is False
+    assert (body.resets.frame.offset, list(body.resets.reset_times)) == (0.0, [])
+
+
 def test_turns_about_the_z_axis_add_up_in_either_direction_and_jumps_do_not():
     """1 s at 1 rad/s, 1 s back: a gyro with a scale error is wrong by its share of both."""
     body = Tumbling()
