@@ -70,6 +70,8 @@ def test_the_spread_is_that_of_a_thrust_axis_that_feedback_turns_all_the_time():
     time = 1.1
     moved, speed = GRAVITY * 0.15 * time**3 / 6.0, GRAVITY * 0.15 * time**2 / 2.0
     assert there.max_climb == pytest.approx(moved + speed * 0.1 + speed**2 / 8.0, rel=0.06)
+    until_level = 0.1 + 0.15 * time / 3.0
+    assert there.max_fall == pytest.approx(moved + speed * until_level + speed**2 / 8.0, rel=0.06)
 
 
 def test_an_autopilot_that_does_not_hold_lets_it_drift_until_drag_has_stopped_it():
