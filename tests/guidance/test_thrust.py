@@ -13,6 +13,7 @@ from companion.guidance import GRAVITY
 from companion.guidance.thrust import (
     TILT_THRUST_SHARE,
     acceleration_within_thrust,
+    largest_tilt,
     predicted_cos_tilt,
     specific_thrust,
 )
@@ -38,6 +39,19 @@ def test_thrust_grows_with_tilt_and_never_without_end():
     assert specific_thrust(0.0, 0.25) == pytest.approx(GRAVITY)
     assert specific_thrust(0.0, 0.0) == specific_thrust(0.0, -1.0) == 0.0
     assert specific_thrust(20.0, 1.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("lift", "tilt"),
+    [
+        (9.5, math.acos(0.5)),  # 95 % of 20 m/s² are 19
+        (-3.0, math.pi / 2.0),  # it falls faster than freely, and needs no lift
+        (19.0, 0.0),
+        (25.0, 0.0),
+    ],
+)
+def test_the_largest_tilt_is_that_at_which_the_lift_takes_95_percent_of_the_thrust(lift, tilt):
+    assert largest_tilt(lift, 20.0) == pytest.approx(tilt)
 
 
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.tuples(rates, rates, rates))
