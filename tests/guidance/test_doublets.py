@@ -62,7 +62,7 @@ def test_each_doublet_turns_back_and_ends_with_a_rest(rates):
 
 
 def test_each_part_of_a_doublet_begins_at_its_first_moment():
-    """+A, −A, +A, rest; the maneuver begins with 1.5 s of hold, and T is 0.25 s: exact in binary."""
+    """+A, −A, +A, rest, after 1.5 s of hold; T is 0.25 s: exact in binary."""
     rolls = [DOUBLETS.at(1.5 + time, START).body_rates.roll for time in (0.0, 0.25, 0.75, 1.0)]
     assert rolls == [0.5, -0.5, 0.5, 0.0]
 
