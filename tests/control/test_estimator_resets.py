@@ -58,6 +58,7 @@ def test_jumps_in_heading_add_up_the_short_way_and_the_attitude_goes_on_without_
         body.step()
     assert body.resets.frame.offset == pytest.approx(3.3 - 2 * np.pi, abs=0.01)
     assert len(body.resets.reset_times) == 3
+    assert body.resets.largest_tilt_jump == 0.0
     before = turn(-body.resets.frame.offset) * body.rotation
     assert body.resets.frame.attitude(quaternion(body.rotation)) == pytest.approx(
         quaternion(before)

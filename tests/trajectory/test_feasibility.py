@@ -1,6 +1,6 @@
 """Feasibility: what a trajectory demands, which limit breaks when, and how slow is slow enough."""
 
-from math import atan, degrees, hypot, radians
+from math import atan, degrees, hypot, nan, pi, radians
 
 import numpy as np
 import pytest
@@ -111,6 +111,22 @@ def test_a_thrust_limit_is_told_as_its_key_has_it(field, share, allowed):
 def test_a_limit_that_is_just_met_is_kept():
     assert violations(EIGHT, Envelope(max_speed=5.0)) == ()
     assert violations(circle(5.0, Laps(5.0, 2)), Envelope(max_tilt=atan(5.0 / G))) == ()
+
+
+@pytest.mark.parametrize("wrong", [0.0, -0.1, 0.5 * pi, 35.0, nan])
+def test_a_tilt_limit_is_an_angle_below_the_horizontal(wrong):
+    """35 is meant in degrees."""
+    assert Envelope(max_tilt=1.57).max_tilt == 1.57
+    with pytest.raises(ValueError, match=r"^max_tilt must be in \(0, π/2\) rad, not "):
+        Envelope(max_tilt=wrong)
+
+
+@pytest.mark.parametrize("limit", ["max_tilt_rate", "min_thrust", "max_climb", "gravity"])
+def test_a_limit_of_less_than_nothing_or_of_no_number_is_refused(limit):
+    assert getattr(Envelope(**{limit: 0.0}), limit) == 0.0
+    for wrong in (-0.1, nan):
+        with pytest.raises(ValueError, match=f"^{limit} must be 0 or more, or None for no limit"):
+            Envelope(**{limit: wrong})
 
 
 def test_all_broken_limits_are_told_in_the_order_of_time():
