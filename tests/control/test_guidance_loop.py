@@ -1,7 +1,7 @@
 """The commands of the guidance loop, on the ground, in a hold, and while a maneuver flies."""
 
 import asyncio
-from math import cos, radians, sin
+from math import cos, inf, nan, radians, sin
 from types import SimpleNamespace
 
 import pytest
@@ -16,6 +16,7 @@ from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.control.telemetry import GuidedVehicle
 from companion.guidance import Doublets, ManeuverSequence, Pose
 from companion.guidance.braking import AssumedBraking
+from companion.guidance.linear import LinearCommand
 from companion.guidance.source import ManeuverSource
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
@@ -217,6 +218,23 @@ def test_a_command_tells_when_it_was_made_and_where_its_target_moves():
     assert (command.made_at, command.period, command.frame.offset) == (13.0, 0.02, 0.25)
     assert (command.idle, command.is_step, command.thrust) == (False, False, None)
     assert command.later_target is not None
+
+
+@pytest.mark.parametrize(("east", "down"), [(nan, 0.0), (0.0, inf)])
+def test_a_command_that_is_not_finite_is_told_and_the_one_before_grows_old(east, down):
+    bench = Bench()
+    before = bench.fly(IN_HOLD)
+    usual = bench.guidance_loop.command_maker.guidance
+    assert not bench.guidance_loop.command_not_finite
+    target, later = Target(0.0, 0.0, 0.0), Target(0.0, east, 0.0)
+    bench.guidance_loop.command_maker.guidance = SimpleNamespace(
+        acts_after=0.1, command=lambda *_: LinearCommand(target, later, down)
+    )
+    assert bench.fly(IN_HOLD + 0.02) is before
+    assert bench.guidance_loop.command_not_finite
+    bench.guidance_loop.command_maker.guidance = usual
+    assert bench.fly(IN_HOLD + 0.04) is not before
+    assert not bench.guidance_loop.command_not_finite
 
 
 def test_what_a_phase_tells_guidance():

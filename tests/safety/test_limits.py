@@ -249,6 +249,15 @@ def silent(reason=None, **changes):
             silent(UnansweredReason.OLD_TARGET, position_fresh=False),
             "positions arrive, but older than deadman.position_stale_ms",
         ),
+        (
+            silent(UnansweredReason.OLD_TARGET, command_not_finite=True),
+            "the commands of guidance (guidance.kind: linear) are NaN or infinite",
+        ),
+        (
+            silent(UnansweredReason.INVALID_RATES),
+            "the planner (planner.name: auto) gives no body rates: they are NaN or infinite, or it "
+            "refuses the target",
+        ),
     ],
 )
 def test_silence_tells_the_stage_that_failed_for_longer_than_its_limit(snapshot, words):
