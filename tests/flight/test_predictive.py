@@ -121,7 +121,7 @@ def vehicle(time):
 
 
 def answer(number, time, north=0.3):
-    return Answer(number, Status.SOLVED, 0.0, time, north, 0.0, 0.1, 12.0, 0.003, 0.002, 1.0)
+    return Answer(number, Status.SOLVED, 0.0, time, north, 0.4, 0.1, 12.0, 0.003, 0.002, 1.0)
 
 
 LINEAR = Target(0.1, 0.2, 0.3), -0.5
@@ -135,8 +135,8 @@ def command(predictive, vehicle, following):
     return flown.target, flown.down
 
 
-def where(time):
-    part = Follow(circle(5.0, Laps(2.0)), yaw_rate=1.0)
+def where(time, laps=Laps(2.0)):
+    part = Follow(circle(5.0, laps), yaw_rate=1.0)
     return FollowedTrajectory(part, time, Pose((0.0, 0.0, -5.0), 0.4))
 
 
@@ -145,8 +145,8 @@ def test_the_answer_for_now_is_flown_with_its_thrust():
     assert command(predictive, vehicle(10.0), where(0.0)) == LINEAR
     solver.answer = answer(1, 10.02)
     target, down = command(predictive, vehicle(10.02), where(0.02))
-    assert target == Target(0.3, 0.0, 0.1)
-    assert GRAVITY - down == pytest.approx(12.0 * (1.0 - 0.3**2) ** 0.5)
+    assert target == Target(0.3, 0.4, 0.1)
+    assert GRAVITY - down == pytest.approx(12.0 * (1.0 - 0.3**2 - 0.4**2) ** 0.5)
     asked = solver.requests[-1]
     assert (asked.number, asked.trajectory_time, asked.start.heading_offset) == (2, 0.02, 0.4)
     assert [one.north for one in asked.inputs] == [0.1, 0.3]
@@ -166,8 +166,11 @@ def test_it_works_in_the_estimators_frame_with_the_heading_resets():
     assert flown == (10.0, 0.1, 0.2, pytest.approx(0.8), pytest.approx(thrust))
     solver.answer = answer(1, 10.02)
     command = predictive.replacement_for(linear, frame, vehicle(10.02), following)
-    assert command.target == command.later == Target(0.3, 0.0, pytest.approx(-0.4))
-    assert command.down == pytest.approx(GRAVITY - 12.0 * (1.0 - 0.3**2) ** 0.5)
+    assert command.target == command.later == Target(0.3, 0.4, pytest.approx(-0.4))
+    assert command.down == pytest.approx(GRAVITY - 12.0 * (1.0 - 0.3**2 - 0.4**2) ** 0.5)
+    turning = where(0.04, Laps(2.0, face_path=True))  # its headings are not relative to the pose's
+    predictive.replacement_for(linear, frame, vehicle(10.04), turning)
+    assert solver.requests[-1].start == Start((0.0, 0.0, -5.0), 0.5)
 
 
 def test_an_answer_for_another_time_is_not_flown():
