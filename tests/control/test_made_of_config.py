@@ -95,6 +95,7 @@ def test_a_change_of_values_reaches_both_loops():
         "guidance": values.guidance,
         "max_tilt": pytest.approx(radians(20.0)),
     }
+    assert values.limits == Limits(radians(20.0), radians(80.0), radians(50.0))
     others = SimpleNamespace(command_maker=SimpleNamespace(guidance="another package's"))
     with pytest.raises(TypeError, match="values of str cannot be changed in flight"):
         Retuning(SimpleNamespace(), others).apply(values)
@@ -133,6 +134,10 @@ def test_a_value_moves_by_equal_factors_and_from_zero_by_equal_amounts():
         with_gains(yaw_gain_per_s=0.0), with_gains(yaw_gain_per_s=0.8), 0.25
     )
     assert started.planner.yaw_gain_per_s == pytest.approx(0.2)
+    ended = interpolated_config(
+        with_gains(yaw_gain_per_s=0.8), with_gains(yaw_gain_per_s=0.0), 0.25
+    )
+    assert ended.planner.yaw_gain_per_s == pytest.approx(0.6)
     weight = hold_weights(CONFIG).velocity
     heavier = CONFIG.guidance.model_copy(update={"velocity_weight_per_s2": 4.0 * weight})
     changed = CONFIG.model_copy(update={"guidance": heavier})
@@ -201,6 +206,8 @@ def test_both_loops_are_made_and_answer_a_sample():
     assert loop.planner._limits == Limits(radians(30.0), radians(80.0), radians(50.0))
     assert loop._hover_thrust is guidance_loop.learning.hover_thrust
     assert guidance_loop.hold.max_tilt == pytest.approx(radians(30.0))
+    safety = CONFIG.safety
+    assert guidance_loop.hold._assumed_braking == (safety.reaction_s, safety.braking_m_s2)
     assert loop.command.period == pytest.approx(0.025)
     now = 10.25
     assert guidance_loop.fresh_position() is vehicle.position

@@ -135,7 +135,10 @@ def command(predictive, vehicle, following):
     return flown.target, flown.down
 
 
-def where(time, laps=Laps(2.0)):
+LAPS = Laps(2.0)
+
+
+def where(time, laps=LAPS):
     part = Follow(circle(5.0, laps), yaw_rate=1.0)
     return FollowedTrajectory(part, time, Pose((0.0, 0.0, -5.0), 0.4))
 
