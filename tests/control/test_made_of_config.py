@@ -320,6 +320,12 @@ def test_only_a_new_reset_of_the_heading_turns_the_estimate():
     assert (observer.settings, resets[2:]) == (["settings"], ["of the correction"])
 
 
+def test_the_drag_along_the_axes_is_that_of_the_newest_heading():
+    made, _ = estimate(axis_coefficient=0.02)
+    made.note_attitude(SAMPLE._replace(q=(cos(0.4), 0.0, 0.0, sin(0.4))))
+    assert made._axis_drag == pytest.approx(AxisDrag(0.02, 0.8))
+
+
 def test_predictive_control_gets_the_newest_attitude_and_the_estimated_wind():
     made, _ = estimate(prior_drag=Drag(), drag=Drag())
     rates = BodyRates(0.1, 0.2, 0.3)

@@ -57,7 +57,7 @@ class Vehicle:
         return turned_about_vertical(TRUE, self.error)
 
     def move(self, rates, dt):
-        pass
+        self.sent = rates
 
 
 def test_a_corrected_heading_does_not_turn_the_line_of_a_step():
@@ -67,6 +67,7 @@ def test_a_corrected_heading_does_not_turn_the_line_of_a_step():
     seen = vehicle.fly(0.5, -2.6, is_step=True)
     assert seen.q == pytest.approx(before, abs=1e-9)
     assert seen.target is TARGET
+    assert vehicle.sent == STILL  # this autopilot's rates are about the vehicle's own axes
 
 
 def test_it_follows_at_most_three_degrees_and_does_not_trust_samples_far_apart():
