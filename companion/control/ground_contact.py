@@ -7,7 +7,7 @@ from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 
 _STILL_SPEED = 0.5
 """Largest estimated vertical speed of a vehicle on the ground, m/s."""
-_IMPACT_SPEED, _IMPACT_TIME = 3.0, 0.25
+_IMPACT_SPEED, _IMPACT_TIME = 4.0, 0.25
 """A vehicle that sank faster than this, m/s, and is still within this time, s, hit the ground: no
 autopilot brakes its landing so hard."""
 _LIFT_OFF_HEIGHT = 1.0
