@@ -18,9 +18,10 @@ from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _MARGIN = 0.5
 """Distance inside the fence at which the vehicle stops, m; covers the tracking error at rest."""
-_BRAKING_LEAD = 0.6
+_BRAKING_LEAD = 0.7
 """Time by which the vehicle brakes earlier than the monitor `braking` requires, s. The deceleration
-needs this time to build up, because the jerk is limited and the vehicle follows late."""
+needs this time to build up, because the jerk is limited and the vehicle follows late. With the
+errors of ArduPilot's estimator at 8 m/s, 0.6 s were too few."""
 _REST_SPEED = 0.2
 """Speed below which a stop is complete, m/s. While a request leads outward, a stop once begun is
 completed, because the vehicle would brake too late if stop and request alternated."""

@@ -61,7 +61,13 @@ def test_a_pilot_who_holds_before_the_answer_comes_is_obeyed(begins):
         lost = LostAnswers(mock, begins, lambda: mock.command(*HOLD))
         summary = fly(mock, hover={"duration_s": 0.5})
         assert mock.state()["mode"] == "LOITER"
-    assert summary.result == "the pilot or another station took over: mode AUTO.LOITER"
+    # The climb may have begun before the pilot holds.
+    assert summary.result.startswith(
+        (
+            "the pilot or another station took over: mode AUTO.LOITER",
+            "the pilot, the autopilot or another station stopped the climb at ",
+        )
+    )
     assert lost.sent_later == []
 
 
