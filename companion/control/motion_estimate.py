@@ -103,18 +103,15 @@ class MotionEstimate:
         previous, self._position = self._position, position
         if previous is not None and position.vehicle_time == previous.vehicle_time:
             return
-        slope_start = position.vehicle_time if previous is None else previous.vehicle_time
-        slope = self._slopes.mean(slope_start, position.vehicle_time)
         time, (north, east, down) = position.vehicle_time, position.position_ned
+        slope = self._slopes.mean(time if previous is None else previous.vehicle_time, time)
         v_north, v_east, v_down = position.velocity_ned
         down, v_down = self._vertical_correction.corrected(time, VerticalMotion(down, v_down))
         measured_motion = self._correction.corrected_motion(
             time, VehicleMotion((north, east, down), (v_north, v_east, v_down))
         )
         modelled_acceleration = self._modelled_acceleration(slope, measured_motion)
-        self._observer.observe(
-            position.vehicle_time, measured_motion, modelled_acceleration, self._correction.trust
-        )
+        self._observer.observe(time, measured_motion, modelled_acceleration, self._correction.trust)
         if offboard_active and previous is not None:
             self._learn_drag(previous, position, slope)
 

@@ -199,10 +199,10 @@ async def disarm(context: FlightContext) -> None:
         await context.until(disarmed)
     await context.fresh_heartbeat()
     await leave_offboard(context)
-    _require_upright(context)
+    _require_undamaged(context)
 
 
-def _require_upright(context: FlightContext) -> None:
+def _require_undamaged(context: FlightContext) -> None:
     """Raise `FlightEnded` if the vehicle fell in its landing, or lies on its side or its back."""
     tilt = context.tilt()
     if tilt is not None and tilt > _UPRIGHT_TILT:

@@ -1,10 +1,11 @@
 """The slow errors of the estimated height and vertical speed, from fix to fix."""
 
-from math import exp, sqrt
+from math import exp
 from random import Random
 from typing import NamedTuple
 
 from sitl_mock.config.sensors import EkfConfig
+from sitl_mock.physics.slow_noise import next_slow_noise
 
 _SINK_ERROR_TIME_S = 2.0
 """Time constant with which the error of the vertical speed follows the acceleration, s."""
@@ -65,5 +66,4 @@ class HeightErrorModel:
         )
 
     def _next_noise(self, noise: float, sigma: float, time: float, elapsed: float) -> float:
-        decay = exp(-elapsed / time)
-        return decay * noise + self._random.gauss(0.0, sigma * sqrt(1.0 - decay * decay))
+        return next_slow_noise(self._random, noise, sigma, exp(-elapsed / time))

@@ -22,6 +22,7 @@ from sitl_mock.physics.navigation_error import (
     propagated_vertical_errors,
 )
 from sitl_mock.physics.rigid_body import GRAVITY
+from sitl_mock.physics.slow_noise import next_slow_noise
 
 _MIN_COURSE_SPEED = 0.5
 """Smallest speed for which the turn rate of the course is computed, m/s; the course of a slower
@@ -152,9 +153,9 @@ class NavigationFilter:
 
     def _next_yaw_noise(self) -> float:
         """Return the slow noise of the heading at the next fix, rad."""
-        config, decay = self._config, self._yaw_decay
-        sigma = radians(config.yaw_error_deg) * sqrt(1.0 - decay * decay)
-        return decay * (self.state.yaw - self.state.noiseless_yaw) + self._random.gauss(0.0, sigma)
+        noise = self.state.yaw - self.state.noiseless_yaw
+        deviation = radians(self._config.yaw_error_deg)
+        return next_slow_noise(self._random, noise, deviation, self._yaw_decay)
 
     def _noiseless_yaw(self, velocity: complex, acceleration: complex, elapsed: float) -> float:
         """Return the next heading error without its noise, rad.
