@@ -173,7 +173,7 @@ class Server:
     # Real time
 
     def _await_client(self) -> None:
-        """Wait until a client connects, if the endpoint can know that; the vehicle boots then."""
+        """Wait for a client on TCP, which then boots the vehicle; UDP and serial need no client."""
         while not self._companion.connected:
             self._connections.wait_for_input(BEACON_PERIOD_S)
 

@@ -44,7 +44,7 @@ class ParameterClient:
     """Reads and writes single parameters.
 
     Args:
-        registry: all waits for answers on the link, which end when the connection drops.
+        registry: keeps the queues of expected answers, so that a dropped connection ends each wait.
         bytewise: returns whether an integer is sent as its four bytes (PX4) instead of as a float
             (ArduPilot).
     """

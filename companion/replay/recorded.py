@@ -110,7 +110,10 @@ class ReplayedVehicle:
 
 
 def recorded_sample(row: Row, setpoint_row: Row | None) -> RecordedSample:
-    """The sample in a row of `SAMPLE`; `setpoint_row`: that of its `SETPOINT`; None: not sent."""
+    """The sample in a row of the channel `SAMPLE`, with its setpoint.
+
+    `setpoint_row`: row of `SETPOINT` for the same sample; None: no setpoint was sent.
+    """
     sample = AttitudeSample(
         int(row["time_boot_ms"]),
         row["vehicle_time_s"],

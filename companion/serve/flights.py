@@ -15,11 +15,11 @@ from companion.vehicle.autopilot import Role
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
 _MAX_HOLD_TRIES = 4
-"""Largest number of commands of hold to a vehicle that a client has landed."""
+"""Largest number of hold commands to a vehicle that a client has landed."""
 
 
 class ServedFlights:
-    """Begins the flights; the owner's control ends with its flight.
+    """Begins the flights. A program is in control (the owner) until its flight ends.
 
     Attributes:
         ownership: decides which client's requests are flown.

@@ -34,8 +34,8 @@ class Aims:
     mismatch_phase_deg: float = 15.0
     """Smallest phase margin when lag and dead time differ by `mismatch_factor`, degrees."""
     rate_fraction: float = 1.0
-    """Largest fraction of the rate limit that three standard deviations of the commanded roll-pitch
-    rate may be."""
+    """Largest ratio of three standard deviations of the commanded roll-pitch rate to the limit of
+    this rate."""
 
 
 class Design(NamedTuple):

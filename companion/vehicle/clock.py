@@ -189,9 +189,9 @@ class VehicleClock:
     def _link_got_quicker(self, stamp: Stamp, max_offset: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
 
-        A quicker link puts `stamp` ahead by at most the delay measured on the slower link.
-        That delay is from TIMESYNC exchanges up to the last sample that fitted the clock: before
-        later exchanges the clock may have jumped.
+        A quicker link puts `stamp` ahead by at most the delay that TIMESYNC measured before. Only
+        exchanges until the last sample that fitted the clock count, because the clock may have
+        jumped after this sample.
         """
         max_delay = self.delay.largest_possible(before=self._last_arrival - SAME_CLOCK_SPREAD)
         return stamp.time > self._newest_time and stamp.apparent_offset - max_offset <= max_delay

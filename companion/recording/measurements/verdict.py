@@ -96,7 +96,11 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
 
 
 def _horizontal_remedy(speed: float, *, drag_was_learned: bool) -> str:
-    """The remedy at `speed`, m/s; `drag_was_learned`: by this flight, for the next one."""
+    """The remedy for a too large horizontal error in a maneuver.
+
+    `speed`: largest speed of its reference, m/s. `drag_was_learned`: whether the flight learned a
+    drag that the next flight uses.
+    """
     if drag_was_learned:
         return "fly again: the next flight begins with the drag that this flight learned"
     advice = "fly it slower" if speed > 0.0 else "fly in less wind"
