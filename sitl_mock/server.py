@@ -173,7 +173,7 @@ class Server:
     # Real time
 
     def _await_client(self) -> None:
-        """Wait for a client on TCP, which then boots the vehicle; UDP and serial need no client."""
+        """Wait until a client connects over TCP; UDP and serial links do not wait."""
         while not self._companion.connected:
             self._connections.wait_for_input(BEACON_PERIOD_S)
 

@@ -68,7 +68,7 @@ class Channel:
             yield message if isinstance(message, dict) else {}
 
     def close(self) -> None:
-        """Close our end."""
+        """Close this process's end."""
         self.is_open = False
         self._socket.close()
 
@@ -77,7 +77,8 @@ class Feed:
     """Sends records of the flight to the helper process. Its methods may run in any thread.
 
     Attributes:
-        dropped: number of datagrams that were not sent: the buffer was full, or the process gone.
+        dropped: number of datagrams that were not sent: the buffer was full, or the process had
+            ended.
     """
 
     def __init__(self, our_socket: socket.socket) -> None:
@@ -98,7 +99,7 @@ class Feed:
             self.dropped += 1
 
     def close(self) -> None:
-        """Close our end."""
+        """Close this process's end."""
         self._socket.close()
 
 

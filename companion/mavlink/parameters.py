@@ -1,7 +1,7 @@
 """Reads and writes parameters. Source: the MAVLink parameter protocol.
 
-PX4 sends integers bytewise: the four bytes of the float field hold the integer. Some integers look
-like a NaN, which a float may not preserve, so the field is handled as bytes here.
+PX4 sends integers bytewise: the four bytes of the float field hold the integer. The bytes
+of some integers are those of a NaN, which a float may not preserve, so this module uses the bytes.
 """
 
 import asyncio

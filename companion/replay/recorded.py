@@ -105,7 +105,7 @@ class ReplayedVehicle:
         self.offset = inputs.clock_offset
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Always None, unknown: `set_inputs` has already left out every position that is stale."""
+        """Always None: the age is unknown, but `set_inputs` has left out stale positions."""
         return None
 
 

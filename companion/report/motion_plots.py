@@ -26,7 +26,7 @@ _NORTH, _EAST, _HEIGHT = range(3)
 _CAMERA_POSITION = {"x": 1.3, "y": -1.7, "z": 1.0}
 """Position of the camera: from the south-east and above, far enough to show the axis titles."""
 _LONGEST_EDGE = 1.2
-"""Longest edge of the box around the track, in Plotly's units: the camera sees the whole box."""
+"""Longest edge of the box around the track, in Plotly's units, so that the camera sees it all."""
 
 
 def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:

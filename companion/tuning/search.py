@@ -186,7 +186,7 @@ def _cost(
 
 
 def tolerated_mismatches(config: Config, aims: Aims) -> list[ModelMismatch]:
-    """Model errors that must leave a margin: wrong lag and dead time; delay by the slew limit."""
+    """Model errors with which a margin must remain: wrong lag and dead time, delay by slewing."""
     factor = aims.mismatch_factor
     mismatches = [ModelMismatch(time_factor=each) for each in (factor, 1.0 / factor)]
     delay = slewing_delay(config)

@@ -166,7 +166,10 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _fit_stamp(self, stamp: Stamp, time_boot_ms: int, max_offset: float) -> Misfit | None:
-        """Adapt the clock (with `max_offset`, s) to a stamp; return the misfit or None."""
+        """Adapt the clock to a stamp; return why the stamp does not fit, or None.
+
+        `max_offset`: largest offset, with the drift since the last sample that fitted, s.
+        """
         if self._start_time == inf:
             self._start_time = self._last_arrival = stamp.received
             self._max_offset = 0.0 if self._lockstep else stamp.apparent_offset

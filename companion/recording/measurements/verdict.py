@@ -10,8 +10,8 @@ Figures = Mapping[str, Any]
 """Figures of a flight: the result of `Summary.as_dict`."""
 
 MAX_HORIZONTAL_RMS, MAX_HORIZONTAL_RMS_PER_SPEED = 0.15, 0.02
-"""Largest RMS of the horizontal error of a maneuver: m with the reference at rest, plus m for each
-m/s of the reference speed."""
+"""Largest RMS of the horizontal error of a maneuver: the first in m, plus the second in m for each
+m/s of the reference's speed."""
 MAX_HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
 MIN_CONSTANT_SHARE = 0.7
