@@ -69,7 +69,7 @@ class LinkListener:
 
     @property
     def samples(self) -> SampleTimes:
-        """The attitude samples so far."""
+        """Times and counts of the attitude samples received so far."""
         sample_pairs = list(pairwise(self._sample_times))
         if not sample_pairs:
             return SampleTimes(len(self._sample_times), unusable_count=self._unusable_count)
