@@ -169,7 +169,7 @@ def flight_ended(result: str) -> FlightEnded:
 
 
 def mark_error_retrieved(future: asyncio.Future[Any]) -> None:
-    """Done-callback without which asyncio would warn; the program's calls raise the error."""
+    """Done-callback: retrieve the error, which the program's calls raise; asyncio would warn."""
     if not future.cancelled():
         future.exception()
 

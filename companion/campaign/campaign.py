@@ -87,7 +87,7 @@ class Campaign:
         )
 
     def _new_value(self, name: str, key: str, value: Any) -> Any:
-        """The value that a key gets: `value`, or this times the base value if `times_base`."""
+        """The new value of a key: `value`, or with `times_base` the base value times `value`."""
         if not self.file.sweep[name].times_base or value is None:
             return value
         base_value = self._base_value(key)

@@ -55,7 +55,7 @@ class CommandMaker:
             now: event-loop time, s.
             inputs: motion of the vehicle, wind, drag and thrust limits.
             heading: present heading of the vehicle, rad.
-            frame: the frame without heading resets.
+            frame: the frame that heading resets do not turn.
             offboard_active: whether the autopilot obeys the setpoints.
         """
         # Target and heading are made from references at the same times.

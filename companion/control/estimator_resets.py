@@ -43,10 +43,10 @@ comes at 10 Hz."""
 
 
 class EstimatorResets:
-    """Finds the jumps, adds them up and counts them.
+    """Finds the jumps of the autopilot's estimate, adds them up and counts them.
 
     Attributes:
-        frame: the frame without heading jumps; its `offset` is the sum of these jumps, rad.
+        frame: the frame that heading jumps do not turn; its `offset` is the sum of the jumps, rad.
         position_shift: sum of the position jumps, m NED.
         heading_corrections: sum of the estimator's gradual heading corrections, rad: heading
             changes that the body rates do not explain, without the jumps; see `StepFrame`.

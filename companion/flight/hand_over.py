@@ -111,7 +111,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
 
 
 class _LandingTimeLimit:
-    """Limits the time for which the landing is commanded again, and warns the pilot."""
+    """Limits the time for which the landing command is repeated, and warns the pilot."""
 
     def __init__(self, context: FlightContext) -> None:
         self._context, self._clock = context, asyncio.get_running_loop().time

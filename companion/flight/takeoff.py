@@ -19,7 +19,7 @@ _MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
 
 _LARGEST_DRIFT = 3.0
-"""Largest distance by which wind carries a vehicle in its climb, m; else somebody flew it away."""
+"""Largest distance by which wind carries a vehicle in its climb, m; beyond, somebody flew it."""
 
 _ARRIVAL_TIMEOUT = 2.0
 """Time allowed to reach altitude after the mode changed to hold, s; then the climb has failed."""
@@ -198,7 +198,7 @@ class _Climb:
             )
 
     def _jump_failure(self, height: float) -> FlightEnded | None:
-        """The end of the flight if a jump explains the wrong `height` above home (m)."""
+        """The end of the flight if `height` (m) is wrong because home or the estimate jumped."""
         climbed_height = self._climbed_height()
         if climbed_height is None:
             return None

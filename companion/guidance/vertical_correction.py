@@ -30,7 +30,7 @@ class VerticalMotion(NamedTuple):
 
 
 class VerticalCorrection:
-    """Corrects the vertical speed by the height, and the height by what its estimator does next.
+    """Corrects the vertical speed by the height, and the height by its filter's next corrections.
 
     If the accelerometer is wrong while the vehicle is tilted, the estimated vertical speed v
     differs from the change of the estimated height z: on a real PX4 by 0.02 to 0.04 m/s in circles
