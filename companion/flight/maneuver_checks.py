@@ -136,7 +136,7 @@ def naming_trajectory_errors(name: str | Path) -> Iterator[None]:
     """Name the maneuver or file in the error of a trajectory that cannot be computed.
 
     Raises:
-        ConfigError: instead of `TrajectoryError`.
+        ConfigError: the block raised a `TrajectoryError`.
     """
     try:
         yield

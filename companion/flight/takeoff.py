@@ -25,7 +25,7 @@ _ARRIVAL_TIMEOUT = 2.0
 """Time allowed to reach altitude after the mode changed to hold, s; then the climb has failed."""
 
 _SMALLEST_RISE = 0.3
-"""A vehicle that has risen less than this has not left the ground, m: the estimate drifts."""
+"""Estimated rise up to which a vehicle counts as still on the ground, m: the estimate drifts."""
 
 _TIPPED_TILT = radians(60.0)
 """A vehicle on the ground that tilts more has tipped over, rad; the same limit as in PX4's failure

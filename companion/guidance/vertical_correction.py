@@ -17,7 +17,7 @@ _ESTIMATOR_TIME = 1.2
 _LARGEST_CORRECTION = 0.1
 """Largest correction of the height, m; the largest one in recorded flights was 0.08 m."""
 _SMALLEST_JUMP = 0.15
-"""A height that differs by more than this from the prediction has jumped, m: that is no motion."""
+"""A height that differs from the prediction by more than this, m, has jumped; no motion does so."""
 _LONGEST_GAP = 0.5
 """Longest time between two positions that are compared, s."""
 
@@ -38,9 +38,9 @@ class VerticalCorrection:
     over seconds the speed is made to agree with the height.
 
     The autopilot's Kalman filter moves its height by its vertical speed, and towards the measured
-    height. The motion towards the measured height is the change that the speed does not explain:
-    ż − v. It is the distance to the measured height divided by the estimator's time constant. So
-    the distance is that time constant times ż − v, and is added to the height.
+    height. The motion towards the measured height is ż − v, the change that the speed does not
+    explain. This change is the distance to the measured height divided by the estimator's time
+    constant. So the distance is this time constant times ż − v. It is added to the height.
     """
 
     def __init__(self) -> None:

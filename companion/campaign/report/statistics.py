@@ -101,7 +101,7 @@ def levels(column: Column) -> list[Group]:
 
 
 def _sort_key(value: object) -> tuple[float, str]:
-    """Sort key of a value: null first, numbers by size, texts by alphabet; and its text."""
+    """A tuple that sorts values: the size (null first; 0 for a text), and the value as text."""
     if isinstance(value, bool):
         return float(value), str(value).lower()
     if isinstance(value, int | float) and isfinite(value):
