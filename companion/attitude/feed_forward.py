@@ -39,7 +39,7 @@ class AxisLead:
         self._plans = plans
 
     def advance(self) -> None:
-        """Move on to the plan made for `plan_delay` seconds before the time of the newest plan."""
+        """Advance to the plan for the time `plan_delay` seconds before that of the newest plan."""
         plans = self._plans
         plan_time = plans.time - self._plan_delay
         self._plan = plans.tilt.at(plan_time) if self._plan_delay else plans.tilt.newest

@@ -29,7 +29,7 @@ class Campaign:
     """A campaign: what to fly, and the files that the flights read."""
 
     file: CampaignFile
-    """Content of the campaign file. A trajectory in `file.sweep` is a path: a key of `files`."""
+    """Content of the campaign file. Trajectories in `file.sweep` are paths: keys of `files`."""
     base: Config
     """Configuration that the swept keys change; the keys of `set` are already applied. If
     `base.flight.trajectory` is set, it is a key of `files`."""

@@ -31,7 +31,9 @@ class CommandMaker:
     """Flies trajectories instead of `guidance`; None: `guidance` flies them."""
 
     def guidance_input(self, now: float) -> GuidanceInput:
-        """Estimate the motion at `now` (s of event-loop time) and when a command takes effect.
+        """Estimate the motion now, and predict it for the time when a command takes effect.
+
+        `now`: event-loop time, s.
 
         Raises:
             RuntimeError: no position has come yet.

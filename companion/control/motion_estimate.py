@@ -207,7 +207,7 @@ class MotionEstimate:
         )
 
     def _drag_mismatch(self) -> tuple[float, float, float] | None:
-        """Top speed, m/s; learned and assumed drag at top speed, 1/s; None: no mismatch."""
+        """Top speed, m/s; learned and assumed drag at top speed, 1/s; None: no sure mismatch."""
         speed = self.drag.top_speed
         learned_drag = self.drag.drag.per_velocity(speed)
         assumed_drag = self.drag.prior_drag.per_velocity(speed)
