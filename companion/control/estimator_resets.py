@@ -38,8 +38,8 @@ _LARGEST_ACCELERATION_CHANGE = 10.0
 """Assumed largest change of the vehicle's acceleration between two positions, m/s²; a position
 change that it explains is no jump."""
 _RESET_MERGE_TIME = 0.5
-"""Time within which several jumps count as one reset, s. ODOMETRY, which counts the same reset,
-comes at 10 Hz."""
+"""Time within which several jumps count as one reset, s. ODOMETRY reports the same reset later,
+because it is sent at 10 Hz."""
 
 
 class EstimatorResets:

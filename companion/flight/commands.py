@@ -157,7 +157,7 @@ async def command_if_ours(
 
 @contextmanager
 def _watching(context: FlightContext, done: IsDone) -> Iterator[Callable[[], None]]:
-    """Watch for the effect of a command, so that it is not repeated after others undid the effect.
+    """Watch a command's effect, so that the command is not repeated after others undid the effect.
 
     Yields a function to call before the first try, and later if the vehicle shows no effect. It
     raises `ModeTakenOver` if a report since its first call has shown the effect.
