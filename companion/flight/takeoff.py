@@ -19,7 +19,7 @@ _MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
 
 _LARGEST_DRIFT = 3.0
-"""Largest distance by which wind carries a vehicle in its climb, m; beyond, somebody flew it."""
+"""Largest horizontal drift by wind in a climb, m; a vehicle farther away was flown by somebody."""
 
 _ARRIVAL_TIMEOUT = 2.0
 """Time allowed to reach altitude after the mode changed to hold, s; then the climb has failed."""

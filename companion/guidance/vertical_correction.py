@@ -10,7 +10,8 @@ than a lap of a circle."""
 _CORRECTION_BANDWIDTH = 2.0
 """Bandwidth of the observer that corrects the height, rad/s."""
 _LARGEST_BIAS = 0.15
-"""An observed error of the speed is clamped to ± this, m/s."""
+"""Largest magnitude of an observed error of the vertical speed, m/s; each observer clamps its
+own."""
 _ESTIMATOR_TIME = 1.2
 """Time constant with which the estimator corrects its height, s. The true heights of 54 flights fit
 1.0 s on ArduPilot and 1.5 s on PX4."""
