@@ -48,11 +48,6 @@ class VerticalCorrection:
         self._bias = _SpeedErrorObserver(_BIAS_BANDWIDTH)
         self._correction = _SpeedErrorObserver(_CORRECTION_BANDWIDTH)
 
-    @property
-    def bias(self) -> float:
-        """Reported minus true vertical speed, m/s, positive down."""
-        return self._bias.error
-
     def corrected(self, time: float, reported: VerticalMotion) -> VerticalMotion:
         """Take a reported height and speed; return them corrected.
 
