@@ -126,8 +126,8 @@ def _table_notes(
     axes_note = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
         axes_note += (
-            ", because it names no frame; to name one, write `# frame: ned` in its first line, or "
-            "csv.frame in a YAML file that names it"
+            ", because it names no frame; to name one, write `# frame: ned` in the table's first "
+            "line, or set csv.frame in the YAML file that names the table"
         )
     notes = [axes_note]
     if table.unused_columns:

@@ -76,7 +76,7 @@ class Hold:
         limit = f"limits.max_tilt_deg = {degrees(largest_tilt):.0f}"
         if largest_tilt < self.max_tilt:
             limit = (
-                f"the {degrees(largest_tilt):.0f}° up to which limits.max_thrust holds the height"
+                f"the {degrees(largest_tilt):.0f}° at which limits.max_thrust just holds the height"
             )
         self.give_up_reason = (
             f"{name} was ended, because the vehicle tilts by {degrees(tilt):.0f}°, more than "

@@ -147,7 +147,7 @@ class PredictiveControl:
     def _report(self, trouble: Trouble, message: str) -> None:
         self.record.troubles[trouble] += 1
         if self.record.troubles[trouble] == 1:
-            self._note(f"predictive control: {message}; linear guidance flies on")
+            self._note(f"predictive control: {message}; linear guidance continues the flight")
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:

@@ -110,13 +110,13 @@ class FenceCheck:
 
 def _breach_text(breach: Breach, time: float, slowing_helps: bool) -> str:
     if breach.distance_outside > 0.0:
-        what_happens = "braking would end" if slowing_helps else "it goes"
+        what_happens = "braking would end" if slowing_helps else "the vehicle goes"
         what_happens = f"{what_happens} up to {breach.distance_outside:.1f} m outside the fence"
     else:
         what_happens = (
-            "it would stop too near to the fence"
+            "the vehicle would stop too near to the fence"
             if slowing_helps
-            else "it comes too near to the fence"
+            else "the vehicle comes too near to the fence"
         )
     return (
         f"from {time:.2f} s on {what_happens} ({breach.where}; {breach.limit} with a margin of "
@@ -126,10 +126,8 @@ def _breach_text(breach: Breach, time: float, slowing_helps: bool) -> str:
 
 def _remedy(slowing_helps: bool) -> str:
     if slowing_helps:
-        return (
-            "fly it more slowly (--slow-down finds how much for a trajectory), or widen the fence"
-        )
-    return "shrink it or widen the fence"
+        return "fly more slowly (for a trajectory, --slow-down finds how much), or widen the fence"
+    return "make the path smaller, or widen the fence"
 
 
 def _vector(row: Floats) -> Vector:

@@ -83,7 +83,9 @@ async def stream(context: FlightContext) -> None:
     """Start to send setpoints, on the ground with zero thrust; wait until enough were sent."""
     context.loop.on = True
     setpoint_goal = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
-    await context.until(lambda: context.loop.record.setpoints >= setpoint_goal, "setpoints to flow")
+    await context.until(
+        lambda: context.loop.record.setpoints >= setpoint_goal, "the first setpoints"
+    )
 
 
 async def arm(context: FlightContext) -> None:

@@ -44,7 +44,7 @@ class ThrustMap:
             gravity: gravity, m/s², which gives the hover thrust; this must be from 0.05 to 0.95.
         """
         if not self.explained >= _LEAST_EXPLAINED:
-            return f"it explains {self.explained:.0%} of the measured thrust"
+            return f"the map explains only {self.explained:.0%} of the measured thrust"
         if not self.slope > 0.0:
             return "the measured thrust falls when the commanded thrust rises"
         if not self.lag + self.dead_time < _LARGEST_DELAY:
@@ -54,7 +54,7 @@ class ThrustMap:
             )
         hover = self.normalised(gravity)
         if not _ACCEPTED_HOVER[0] < hover < _ACCEPTED_HOVER[1]:
-            return f"it puts hover at a thrust of {hover:.2f}"
+            return f"by the map the vehicle hovers at a thrust of {hover:.2f}"
         return None
 
     def described(self) -> str:

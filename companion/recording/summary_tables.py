@@ -110,7 +110,7 @@ def _tracking(summary: Summary) -> RenderableType:
         errors = maneuver.horizontal_rms, maneuver.horizontal_max
         level = [_with_unit(error, "m", 2) for error in errors]
         if maneuver.open_loop:
-            level = ["open loop", f"{maneuver.drift:.2f} m away"]
+            level = ["open loop", f"{maneuver.drift:.2f} m of drift"]
         heights = _with_unit(maneuver.height_rms, "m", 2), _with_unit(maneuver.height_max, "m", 2)
         table.add_row(maneuver.name, *level, *heights)
     return table

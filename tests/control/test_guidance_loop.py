@@ -266,7 +266,7 @@ def test_what_a_phase_tells_guidance():
 
 def test_a_guidance_loop_knows_nothing_before_its_first_step():
     guidance = Bench(begun=False).guidance_loop
-    with pytest.raises(RuntimeError, match="before any position came"):
+    with pytest.raises(RuntimeError, match="before any position had come"):
         guidance.hold_here()
     assert (guidance.motion, guidance.tracking_error, guidance.hold.give_up_reason) == (
         None,

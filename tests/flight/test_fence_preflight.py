@@ -98,7 +98,7 @@ def test_slowing_down_is_not_advised_where_it_does_not_help(tmp_path, text, limi
     way = merged(following(tmp_path, text), {"flight": {"slow_down": slow}})
     told = refusal(way, limits={"fence_radius_m": 8.0, **limits})
     assert words in told
-    assert told.endswith("shrink it or widen the fence")
+    assert told.endswith("make the path smaller, or widen the fence")
     assert "slow" not in told.removeprefix(way["flight"]["trajectory"])
 
 

@@ -83,7 +83,7 @@ def test_the_solvers_death_is_reported_and_costs_little(tmp_path):
     summary = flown(tmp_path, "figure8.yaml", kill)
     (told,) = [text for _, text in summary.events if "predictive" in text]
     assert "ended by signal 9" in told
-    assert "linear guidance flies on" in told
+    assert "linear guidance continues the flight" in told
     assert summary.as_dict()["nmpc"]["troubles"] == {"died": 1}
     assert 200 < summary.as_dict()["nmpc"]["flown"] < 500
     assert summary.tracking()["position_max_m"] <= 0.3
@@ -198,5 +198,5 @@ def test_each_kind_of_trouble_is_told_once_and_all_are_counted():
         solver.report(Trouble.LATE, "request 6 took 31.0 ms")
     solver.report(Trouble.IMPLAUSIBLE, "the answer to request 9 has a thrust of 99.00 m/s²")
     assert len(notes) == 2
-    assert "took 31.0 ms; linear guidance flies on" in notes[0]
+    assert "took 31.0 ms; linear guidance continues the flight" in notes[0]
     assert predictive.record.troubles == {Trouble.LATE: 3, Trouble.IMPLAUSIBLE: 1}

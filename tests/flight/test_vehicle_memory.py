@@ -91,7 +91,7 @@ def test_another_vehicles_drag_counts_only_until_this_one_is_known(tmp_path):
     with mock_vehicle(tmp_path, seed=3) as mock:
         flown = fly(mock, tmp_path / "log", **steep)
     assert flown.phase == "checks"
-    assert "the drag is not known: assumed up to 0.7 1/s" in flown.result
+    assert "the vehicle's drag is not known; up to 0.7 1/s is assumed" in flown.result
 
 
 def test_it_is_the_vehicles_own(tmp_path):

@@ -120,7 +120,8 @@ SAID = [
     (
         lambda: autopilot_breaches.any_estimator_reset,
         at(resets=Resets(1, 0.5, 0.3)),
-        "the estimator was reset: 0.5 m and 17° of heading in total; the references moved as much",
+        "the estimator was reset: 0.5 m and 17° of heading in total; the references were moved by "
+        "the same amount",
     ),
     (
         lambda: autopilot_breaches.battery(0.2),

@@ -316,7 +316,7 @@ def test_what_is_no_program_no_configuration_or_no_fault_is_refused_in_a_sentenc
 
     with pytest.raises(ValueError, match=r"coroutine was expected, as in run\(vehicle, main\(\)\)"):
         run(mock, main)
-    with pytest.raises(TypeError, match="a configuration is a Config, a path or keys by section"):
+    with pytest.raises(TypeError, match="config must be a Config, a path or a dict of sections"):
         run(mock, main(5))
     with pytest.raises(ConfigError, match="`limit` is not a known key; did you mean `limits`"):
         run(mock, main({"limit": {"max_tilt_deg": 20.0}}))

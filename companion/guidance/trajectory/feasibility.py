@@ -237,5 +237,5 @@ def _violation(times: Floats, quantity: _LimitedQuantity) -> Violation | None:
         f"{'no less than ' if quantity.is_lower_limit else ''}{limit_value:.4g}{unit}"
     )
     if begin_time < time:
-        text += f" (broken from {begin_time:.2f} s on)"
+        text += f" (violated from {begin_time:.2f} s on)"
     return Violation(quantity.limit, begin_time, time, text)
