@@ -47,7 +47,7 @@ class Hold:
         if self._flown_source.remaining_braking_time(now) > 0.0:
             return  # a new braking would stop the vehicle further away
         inputs = self._command_maker.guidance_input(now)
-        motion, (north, east, _) = inputs.now, inputs.now.velocity_ned
+        motion, (north, east, _) = inputs.present, inputs.present.velocity_ned
         acceleration_by_tilt = GRAVITY * tan(self._largest_tilt())
         acceleration = acceleration_beside_wind(
             acceleration_by_tilt, (north, east), inputs.disturbance

@@ -165,8 +165,8 @@ class MotionEstimate:
         north, east = inputs.disturbance
         return VehicleSnapshot(
             now,
-            inputs.now.position_ned,
-            inputs.now.velocity_ned,
+            inputs.present.position_ned,
+            inputs.present.velocity_ned,
             self._q,
             self._body_rates,
             (north, east, 0.0),

@@ -93,7 +93,7 @@ class PredictiveControl:
 
         `frame`: the frame without heading resets.
         """
-        target, acceleration_down = linear_command.target, linear_command.down
+        target, acceleration_down = linear_command.target, linear_command.acceleration_down
         target = target._replace(heading=frame.estimated_heading(target.heading))
         answer = None if followed_trajectory is None else self._answer(vehicle.time)
         if answer is not None:

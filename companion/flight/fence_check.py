@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from companion.guidance.fence import Breach, Fence, Place
+from companion.guidance.fence import Breach, Fence, LatLon
 from companion.guidance.reference import Vector
 from companion.guidance.trajectory.demand import Motion, columns
 from companion.guidance.trajectory.feasibility import Violation
@@ -33,7 +33,7 @@ class FenceCheck:
     """The fence that the monitors watch in flight."""
     height: float
     """Height above home where control begins, m."""
-    origin: Place | None = None
+    origin: LatLon | None = None
     """Geographic position where control begins, or None; then a fence in latitude and longitude is
     not checked."""
 
@@ -80,7 +80,7 @@ class FenceCheck:
             int(stopping_points[:, 2].argmin()),
             int(stopping_points[:, 2].argmax()),
         }
-        if self.fence.polygon or (self.fence.places and self.origin):
+        if self.fence.polygon or (self.fence.polygon_deg and self.origin):
             step_lengths = np.hypot(*np.diff(stopping_points[:, :2], axis=0).T)
             path_sections = np.floor(
                 np.concatenate(([0.0], np.cumsum(step_lengths))) / _POINT_DISTANCE
@@ -91,8 +91,8 @@ class FenceCheck:
     def _breach(self, motion: Motion, k: int) -> Breach | None:
         offset, velocity = _vector(motion.position[k]), _vector(motion.velocity[k])
         fence = self.fence
-        if fence.places and self.origin is None:
-            fence = replace(fence, places=())
+        if fence.polygon_deg and self.origin is None:
+            fence = replace(fence, polygon_deg=())
         north, east, _ = _vector(motion.acceleration[k])
         height = self.height - offset[2]
         return fence.breach_at_stopping_point(

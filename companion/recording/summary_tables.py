@@ -30,7 +30,7 @@ def flight_table(summary: Summary) -> RenderableType:
 
 def styled_text(closing_words: ClosingWords) -> Text:
     """The closing words as coloured text."""
-    style = "green" if closing_words.good else "yellow" if closing_words.completed else "red"
+    style = "green" if closing_words.was_good else "yellow" if closing_words.completed else "red"
     text = Text(closing_words.headline, style=f"bold {style}")
     for line in closing_words.lines:
         text.append(f"\n{line}", style="yellow" if line.startswith("!") else "not bold default")

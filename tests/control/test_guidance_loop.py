@@ -228,7 +228,7 @@ def test_a_command_that_is_not_finite_is_told_and_the_one_before_grows_old(east,
     assert not bench.guidance_loop.command_not_finite
     target, later = Target(0.0, 0.0, 0.0), Target(0.0, east, 0.0)
     bench.guidance_loop.command_maker.guidance = SimpleNamespace(
-        acts_after=0.1, command=lambda *_: LinearCommand(target, later, down)
+        effect_delay=0.1, command=lambda *_: LinearCommand(target, later, down)
     )
     assert bench.fly(IN_HOLD + 0.02) is before
     assert bench.guidance_loop.command_not_finite

@@ -6,7 +6,7 @@ import pytest
 
 from companion.config import Config
 from companion.control.loop_record import UnansweredReason
-from companion.guidance.fence import Fence, Place
+from companion.guidance.fence import Fence, LatLon
 from companion.safety import (
     Action,
     SafetyLadder,
@@ -174,7 +174,7 @@ SAID = [
     ),
     (
         lambda: link_breaches.frozen,
-        at(health=Health(frozen="ATTITUDE_QUATERNION repeats one attitude")),
+        at(health=Health(frozen_telemetry="ATTITUDE_QUATERNION repeats one attitude")),
         "frozen telemetry: ATTITUDE_QUATERNION repeats one attitude",
     ),
     (
@@ -282,7 +282,7 @@ def test_it_brakes_in_time_before_a_fence_on_the_map():
     corners = ((46.999, 7.999), (46.999, 8.001), (47.001, 8.001), (47.001, 7.999))  # 111 m north
     check = braking(Fence(inf, inf, -inf, (), corners, 2.0, 0.5))
     moving = Motion(
-        offset=(80.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), height=20.0, origin=Place(47.0, 8.0)
+        offset=(80.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), height=20.0, origin=LatLon(47.0, 8.0)
     )
     assert check(at(motion=moving), False) is None  # stops 2 m on
     fast = moving._replace(velocity=(12.0, 0.0, 0.0))  # stops 42 m on

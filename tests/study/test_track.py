@@ -88,7 +88,7 @@ def test_the_truth_is_that_of_the_vehicle_at_the_same_time(vehicle):
 def test_each_flight_is_told_as_it_begins(flown):
     assert flown[1] == [
         "figure-eight, 4 m/s, model-following",
-        "figure-eight, 4 m/s, model-following, not led",
+        "figure-eight, 4 m/s, model-following, without lead",
         "figure-eight, 4 m/s, model-following in 3 m/s of wind",
     ]
 
@@ -197,7 +197,7 @@ def test_the_findings_follow_from_the_numbers():
     assert verdicts(**{"circle, 3 m/s, model-following": 0.0233})[:2] == [False, False]
     windy = "figure-eight, 1 m/s, model-following in 3 m/s of wind"
     assert verdicts(**{windy: 0.2}) == [True, True, False, True, True, True]
-    calm = "circle, 5 m/s, model-following, not led"
+    calm = "circle, 5 m/s, model-following, without lead"
     assert verdicts(**{calm: 0.04}) == [True, True, True, False, True, True]
     assert verdicts(**{f"{calm} in 3 m/s of wind": 0.07}) == [True, True, True, True, False, True]
     windy = "figure-eight, 5 m/s, model-following in 3 m/s of wind"

@@ -21,7 +21,7 @@ from companion.study.lag.flights import (
     Grid,
     GridCell,
     Score,
-    fly_complete,
+    fly_complete_loop,
     fly_example,
     fly_grid,
     in_percent,
@@ -54,7 +54,7 @@ def run(tick: Tick) -> Outcome:
     grid = fly_grid(tick)
     tick("the example")
     example = fly_example()
-    complete = fly_complete(tick)
+    complete = fly_complete_loop(tick)
     fitted_models = {
         method: _fit_model(response) for method, response in complete.shown_responses.items()
     }
