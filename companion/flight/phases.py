@@ -147,7 +147,7 @@ def _checks(config: FlightConfig, purpose: str, work: Work, roles: frozenset[Rol
 def _takeoff(config: FlightConfig) -> Phase:
     return Phase(
         "takeoff",
-        "the height",
+        "the take-off height",
         takeoff.takeoff,
         config.takeoff_timeout_s,
         Exit.LAND,

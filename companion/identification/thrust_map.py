@@ -49,8 +49,8 @@ class ThrustMap:
             return "the measured thrust falls when the commanded thrust rises"
         if not self.lag + self.dead_time < _LARGEST_DELAY:
             return (
-                f"lag plus dead time of the rotors is {self.lag + self.dead_time:.2f} s, not less "
-                f"than {_LARGEST_DELAY:.2f} s"
+                f"lag plus dead time of the rotors is {self.lag + self.dead_time:.2f} s; it must "
+                f"be less than {_LARGEST_DELAY:.2f} s"
             )
         hover = self.normalised(gravity)
         if not _ACCEPTED_HOVER[0] < hover < _ACCEPTED_HOVER[1]:

@@ -125,7 +125,7 @@ def _predictive_words(figures: PredictiveFigures) -> Text:
     unused_text = ", ".join(f"{count} {name}" for name, count in figures.unused_answers.items())
     if unused_text:
         words += (
-            f"; linear guidance replaced {sum(figures.unused_answers.values())} others: "
+            f"; linear guidance replaced {sum(figures.unused_answers.values())} other answers: "
             f"{unused_text}"
         )
     return Text(words)

@@ -63,7 +63,7 @@ def test_a_trajectory_is_judged_by_what_was_learned(tmp_path):
         update={"guidance": config.guidance.model_copy(update={"drag_per_s": 0.2})}
     )
     configured_maneuvers(told)
-    with pytest.raises(ConfigError, match=r"not known: assumed up to 0.7 1/s"):
+    with pytest.raises(ConfigError, match=r"not known; up to 0.7 1/s is assumed"):
         configured_maneuvers(
             parse(
                 bounded_yaml.dump(

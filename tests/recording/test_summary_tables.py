@@ -147,6 +147,6 @@ def test_predictive_control_is_counted_with_what_it_left_to_linear_guidance():
 
     assert told(PredictiveFigures(3, {"late": 2, "failed": 1}, (0.001, 0.002, 0.009))) == (
         "predictive control: 3 answers flown, computed in 2.0 ms (p99 8.9 ms); linear guidance "
-        "replaced 3 others: 2 late, 1 failed"
+        "replaced 3 other answers: 2 late, 1 failed"
     )
     assert told(PredictiveFigures(0, {}, ())) == "predictive control: 0 answers flown"

@@ -126,7 +126,7 @@ def _dead_time_finding(flights: Flights) -> Finding:
         "ours",
         "Predicting past the dead time helps every model.",
         min(error_ratios.values()) > 1.0,
-        "Error on the figure-eight without this prediction, divided by that with it:"
+        "Error on the figure-eight without this prediction, divided by the error with it:"
         f" {ratios_text}.",
     )
 

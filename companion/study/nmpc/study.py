@@ -89,8 +89,9 @@ def _time_table(flights: Flights) -> Table:
         )
     return Table(
         "nmpc",
-        "Processor time of the solver on the figure-eight, all models in turn: the real-time"
-        f" iteration, and the SQP to its tolerance or to {MAX_ITERATIONS} iterations (the end).",
+        "Processor time of the solver on the figure-eight, all models in turn: for one"
+        " iteration, and to the end, which is the tolerance of the SQP or "
+        f"{MAX_ITERATIONS} iterations.",
         tuple(rows),
     )
 
