@@ -26,9 +26,9 @@ from companion.guidance.trajectory import (
     Table,
     Trajectory,
     TrajectoryError,
-    computable,
     from_samples,
     read_csv,
+    reporting_numerical_errors,
 )
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.spline_curve import SplineCurve
@@ -235,7 +235,7 @@ def read(path: Path) -> LoadedTrajectory:
             impossible trajectory.
     """
     try:
-        with computable():
+        with reporting_numerical_errors():
             loaded_trajectory = (
                 CsvShape(file=Path(path.name)).read(path.parent)
                 if is_table(path)

@@ -58,8 +58,8 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         *_comparison_lines(before, after),
         f"disturbances: gusts of {proposal.disturbances.gust:g} m/s, noise: "
         f"{proposal.disturbances.source}",
-        f"required: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°; reached in spite of "
-        "errors of the vehicle model:",
+        f"required margins: {aims.gain_db:g} dB and {aims.phase_deg:g}°; with errors of the "
+        "vehicle model they are:",
     ]
     lines += [
         f"margin {_mismatch_text(mismatch)}: {margins.sentence()}"

@@ -173,7 +173,7 @@ SAID = [
         "one that this program did not send (ATTITUDE_TARGET)",
     ),
     (
-        lambda: link_breaches.frozen,
+        lambda: link_breaches.frozen_telemetry,
         at(health=Health(frozen_telemetry="ATTITUDE_QUATERNION repeats one attitude")),
         "frozen telemetry: ATTITUDE_QUATERNION repeats one attitude",
     ),

@@ -4,7 +4,7 @@ from itertools import product
 
 from companion.recording.measurements.second_order import SecondOrderModel
 from companion.study.lag.figure import CAPTION, draw_figure
-from companion.study.lag.findings import find
+from companion.study.lag.findings import make_findings
 from companion.study.lag.flights import (
     DEAD_TIMES_MS,
     EXAMPLE_ERRORS_HZ,
@@ -91,7 +91,7 @@ def run(tick: Tick) -> Outcome:
                 complete.by_rate[SHOWN_RATE_HZ].model_following_scores,
             ),
         ),
-        findings=find(grid, example, complete, deviations),
+        findings=make_findings(grid, example, complete, deviations),
         series=(*_grid_series(grid), _complete_series(complete)),
     )
 

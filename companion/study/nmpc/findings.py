@@ -28,7 +28,7 @@ _MAX_ANSWER_MS = 10.0
 """Required 99th percentile of the solver process's answer time, ms; half a period."""
 
 
-def find(flights: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
+def make_findings(flights: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
     """All findings."""
     return (
         _solve_time_finding("paper", ("euler", "quaternion"), flights),

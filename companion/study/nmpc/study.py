@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from companion.study.drawing import draw_line, new_figure
 from companion.study.methods import REFERENCE_STYLE
-from companion.study.nmpc.findings import find
+from companion.study.nmpc.findings import make_findings
 from companion.study.nmpc.flights import FLIGHT_S, Flights, fly_all
 from companion.study.nmpc.timing import (
     ColdStarts,
@@ -65,7 +65,7 @@ def run(tick: Tick) -> Outcome:
             _error_table(flights),
             _process_table(times),
         ),
-        findings=find(flights, counts, times),
+        findings=make_findings(flights, counts, times),
         series=(_flights_table(flights),),
     )
 

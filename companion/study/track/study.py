@@ -7,7 +7,7 @@ from companion.attitude import PLANNER_NAMES
 from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
 from companion.study.outcome import Cell, Outcome, Table, Tick
 from companion.study.track.figure import CAPTION, draw_figure
-from companion.study.track.findings import find
+from companion.study.track.findings import make_findings
 from companion.study.track.flights import (
     GUST_SHARE,
     MAX_TILT_DEG,
@@ -65,7 +65,7 @@ def run(tick: Tick) -> Outcome:
         figure=draw_figure(flights),
         caption=CAPTION,
         tables=_tables(flights),
-        findings=find(flights),
+        findings=make_findings(flights),
         series=(_flights_table(flights),),
         rows=_rows(flights),
     )
