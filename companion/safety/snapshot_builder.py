@@ -23,7 +23,7 @@ from companion.safety.snapshot import (
 )
 from companion.vehicle.link import Link
 
-_MAX_PLACE_AGE = 1.0
+_MAX_LAT_LON_AGE = 1.0
 """Largest age of the GLOBAL_POSITION_INT that gives the place where control begins, s."""
 _GAP_COUNTING_TIME = 5.0
 """Time over which gaps in the setpoints are counted, s."""
@@ -199,6 +199,6 @@ class SnapshotBuilder:
     def _current_lat_lon(self, now: float) -> LatLon | None:
         """Latitude and longitude of the vehicle, or None if they are old."""
         newest = self._link.state.global_position
-        if newest is None or now - newest.received > _MAX_PLACE_AGE:
+        if newest is None or now - newest.received > _MAX_LAT_LON_AGE:
             return None
         return LatLon(newest.latitude_deg, newest.longitude_deg)

@@ -92,7 +92,7 @@ def decode_global_target(message: Message, pose: VehiclePose) -> MotionRequest:
     """
     frame = message.coordinate_frame
     if frame in _TERRAIN_FRAMES:
-        raise RefusedSetpoint("heights above terrain are not known here: use AMSL or above home")
+        raise RefusedSetpoint("the terrain is unknown: give a height above sea level or home")
     if frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
         raise RefusedSetpoint(f"coordinate_frame {frame} is not supported")
     position, velocity, acceleration = _groups(message, (0.0, 0.0, message.alt))
