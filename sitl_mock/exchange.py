@@ -1,9 +1,9 @@
 """The datagrams that one vehicle receives and sends, with the faults of its companion link.
 
 `Exchange` has no sockets and no clock. `Server` joins it to sockets, `companion.testing` to a
-program in the same process. In each slot both call `step` and send `take_outgoing` of each link. In
-lockstep they pass the datagrams that arrived since the last slot to `step`; in real time they
-`deliver` each one as it arrives.
+program in the same process. A slot is one cycle of the autopilot, in which it can send. In each
+slot both call `step` and send `take_outgoing` of each link. In lockstep they pass the datagrams
+that arrived since the last slot to `step`; in real time they `deliver` each one as it arrives.
 """
 
 from collections.abc import Callable

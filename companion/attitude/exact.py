@@ -16,8 +16,8 @@ from companion.attitude.rotation import angle_per_sine, clamp, limit_rates, wrap
 from companion.attitude.types import Quaternion, Target
 
 SHORTEST_PERIOD = 1e-4
-"""Shortest sample period that is used, s. For a shorter one the rates differ from the exact ones by
-at most 1e-4·p (relative).
+"""Shortest sample period that is used, s; a shorter one is replaced by this value. The rates then
+differ from the exact ones by at most 1e-4·p (relative).
 """
 LONGEST_PERIOD = 1.0
 """Longest sample period that is used, s; a longer one is replaced by this value."""

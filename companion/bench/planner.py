@@ -48,7 +48,8 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     """Measure every planner that keeps no state, interleaved with the baselines.
 
     Args:
-        seconds: duration of the measurement without compilation, s; at least one round is measured.
+        seconds: duration of the measurement, s, to which compiling adds; at least one round is
+            measured.
         as_json: print nothing; the caller prints the result.
 
     Returns:

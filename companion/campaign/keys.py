@@ -74,7 +74,7 @@ def _check_mock_key(name: str, section: Mapping[str, Any], place_text: str) -> N
 
 
 def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
-    """The configuration with new values by dotted key, and with its complete section `mock`.
+    """`base` with the new values in `changes`, by dotted key; its section `mock` gets all defaults.
 
     Raises:
         ConfigError: a value is refused; the message names the key.

@@ -111,7 +111,7 @@ class _CampaignReader:
         return replace_unchecked(base, flight={"arm": True, "trajectory": copied_path})
 
     def _with_copied_files(self, name: str, swept: SweptValues) -> SweptValues:
-        """The factor, with each path of a trajectory file replaced by that of its copy."""
+        """The factor, with each path of a trajectory file replaced by the path of its copy."""
         if TRAJECTORY not in swept.changed_keys(name):
             return swept
         listed_values = swept.values or swept.choice or ()

@@ -37,7 +37,7 @@ SHIPPED_CONFIG = Path()
 """Value of `--bundled` without a file: the shipped configuration."""
 _MANEUVER = "identify"
 _PLANNER = "first-order"
-"""Planner for the flight: it needs no knowledge of the vehicle's response."""
+"""Planner for the flight; this one needs no knowledge of the vehicle's response."""
 _LONGEST_NAME = 200
 _FRAGMENT, _CONFIG = "vehicle.yaml", "config.yaml"
 

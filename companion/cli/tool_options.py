@@ -19,7 +19,7 @@ from companion.cli.options import (
 from companion.study import registry
 
 STARTING_FILES = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
-"""Name that the user gives to `init` -> shipped file from which `init` makes a new one."""
+"""For each name that `init` accepts: the shipped file from which `init` makes a new one."""
 
 
 def add_serve(commands: Commands) -> None:

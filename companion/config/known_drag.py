@@ -54,7 +54,7 @@ class KnownDrag(NamedTuple):
 
 
 def drag_before_connecting(config: Config) -> KnownDrag:
-    """The configured drag, or the one of the vehicle that flew last; unknown without either."""
+    """The configured drag; else the one learned by the vehicle that flew last; else unknown."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
     learned_file = newest_learned(config.recording.directory)
@@ -62,7 +62,7 @@ def drag_before_connecting(config: Config) -> KnownDrag:
 
 
 def drag_of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
-    """The configured drag, or the one that this vehicle learned; unknown without either.
+    """The configured drag; else the one that this vehicle learned; else unknown.
 
     Args:
         config: configuration of the flight.

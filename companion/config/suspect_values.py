@@ -13,8 +13,8 @@ _CLIMB_SPEED, _LIFT_OFF_TIME = 1.5, 4.0
 """Speed of a take-off, m/s, and time before the vehicle leaves the ground, s; by the defaults of
 the autopilot with the slower climb."""
 _DESCENT_SPEED, _LANDING_SPEED, _LANDING_HEIGHT = 1.5, 0.5, 10.0
-"""Speeds of a landing above and below this height, m/s and m; by the defaults of the autopilot with
-the slower landing."""
+"""Speeds of a landing above and below `_LANDING_HEIGHT`, m/s, and this height, m; by the defaults
+of the autopilot with the slower landing."""
 _USUAL_VALUE_BY_SUFFIX = {"_deg_s2": 1000.0, "_ms": 50.0}
 """Usual value of a key whose default is null, by the suffix of the key."""
 _MAX_SHARE_OF_USUAL = 1.0 / 20.0

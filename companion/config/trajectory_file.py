@@ -41,7 +41,7 @@ _SMALLEST_REPORTED_DETOUR = 0.05
 _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
 _LARGEST_YAW_RANGE = 13.0
-"""Largest change of yaw that no note reports, rad: a little more than two turns."""
+"""Largest range of yaw without a note, rad: a little over two turns; more may be degrees."""
 _MOST_ROWS_COMPARED = 2000
 """Tables with more rows are not compared with the path, because their rows are dense."""
 

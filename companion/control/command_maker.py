@@ -31,7 +31,9 @@ class CommandMaker:
     """Flies trajectories instead of `guidance`; None: `guidance` flies them."""
 
     def guidance_input(self, now: float) -> GuidanceInput:
-        """Estimate the motion at `now` (s of event-loop time) and when a command takes effect.
+        """Estimate the motion now, and predict it for the time when a command takes effect.
+
+        `now`: event-loop time, s.
 
         Raises:
             RuntimeError: no position has come yet.
@@ -55,7 +57,7 @@ class CommandMaker:
             now: event-loop time, s.
             inputs: motion of the vehicle, wind, drag and thrust limits.
             heading: present heading of the vehicle, rad.
-            frame: the frame without heading resets.
+            frame: the frame that heading resets do not turn.
             offboard_active: whether the autopilot obeys the setpoints.
         """
         # Target and heading are made from references at the same times.

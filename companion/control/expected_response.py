@@ -25,7 +25,7 @@ _LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
 
 @dataclass(frozen=True, slots=True)
 class ExpectedResponse:
-    """Predicted response to the largest step of the maneuver `steps`, −0.3 to 0.3 for example."""
+    """Predicted response to the largest step of the maneuver `steps`, such as from −0.3 to 0.3."""
 
     coefficient: float
     """`steps.coefficient`, at which the step ends."""

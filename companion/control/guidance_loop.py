@@ -31,15 +31,15 @@ class GuidanceLoop:
     On the ground the command is idle until a take-off is commanded. After that, guidance damps the
     motion until it gets a pose. `hold_here` stops and holds a pose; `follow` flies a source from
     that pose. If open-loop rates tilt the vehicle too far, the source ends, and the vehicle brakes
-    and holds. Poses and references are in the frame without resets, so no reset moves the vehicle.
+    and holds. Poses and references are in a frame that the estimator's resets do not move.
 
     Attributes:
         flown_source: the held pose and the source that is flown from it.
         gave_up: True after `give_up`: from then on no source may be flown.
-        motion: motion of the vehicle at the last step, without resets, or None.
+        motion: motion of the vehicle at the last step, in the frame of the poses, or None.
         command_not_finite: True if guidance returned NaN or infinity at the last step.
         acceleration: horizontal acceleration of the vehicle at the last step, m/s², NED.
-        tracking_error: see `FlownSource.tracking_error`; that of the last step, m.
+        tracking_error: `FlownSource.tracking_error` at the last step, m.
         estimate: estimates the motion.
         learning: learns the hover thrust.
         command_maker: makes the commands.

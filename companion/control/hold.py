@@ -55,9 +55,10 @@ class Hold:
         self._flown_source.hold(brake(now, motion, heading, acceleration, self._assumed_braking))
 
     def move_upwind(self, now: float, wind: NorthEast) -> None:
-        """Move the hold upwind by the `drift` to expect when the autopilot takes over.
+        """Move the hold upwind by the drift to expect when the autopilot takes over.
 
-        Nothing changes if no hold has begun, or if the hold moves upwind already.
+        The drift is that of `handover_drift`. Nothing changes if no hold has begun, or if the hold
+        moves upwind already.
         """
         braking = self._flown_source.braking
         if isinstance(braking, Braking):

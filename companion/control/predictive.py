@@ -91,7 +91,7 @@ class PredictiveControl:
         The solver works in the estimator's frame, whose heading jumps at each reset. The solver's
         target is constant for a period, which its model takes into account.
 
-        `frame`: the frame without heading resets.
+        `frame`: the frame that heading resets do not turn.
         """
         target, acceleration_down = linear_command.target, linear_command.acceleration_down
         target = target._replace(heading=frame.estimated_heading(target.heading))

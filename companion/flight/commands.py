@@ -34,8 +34,9 @@ RequireControl = Callable[[], None]
 def roles_of(link: Link) -> frozenset[Role]:
     """The roles of the vehicle's mode, such as HOLD; empty if the mode is unknown or has no role.
 
-    A hold that a failsafe chose is not ready for a take-off or takeover: PX4 holds for
-    COM_FAIL_ACT_T before it returns or lands, and a command of ours would end the failsafe.
+    In a hold that a failsafe chose, READY is left out, so that no take-off or takeover begins: PX4
+    holds for COM_FAIL_ACT_T before it returns or lands, and a command of ours would end the
+    failsafe.
     """
     state = link.state
     roles = frozenset[Role]() if state.mode is None else link.autopilot.roles(state.mode)
@@ -87,7 +88,7 @@ def _taken_over(link: Link) -> ModeTakenOver:
 
 
 async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
-    """Return `ended`, with the autopilot's geofence as reason if it has changed the mode.
+    """Return `ended`; its reason is the autopilot's geofence if the geofence changed the mode.
 
     ArduPilot reports a geofence breach only in a STATUSTEXT. Control is released before this
     function waits for the text.
@@ -156,7 +157,7 @@ async def command_if_ours(
 
 @contextmanager
 def _watching(context: FlightContext, done: IsDone) -> Iterator[Callable[[], None]]:
-    """Watch for the effect of a command, so that it is not repeated after others undid the effect.
+    """Watch a command's effect, so that the command is not repeated after others undid the effect.
 
     Yields a function to call before the first try, and later if the vehicle shows no effect. It
     raises `ModeTakenOver` if a report since its first call has shown the effect.

@@ -116,7 +116,7 @@ class FlightFiles:
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """An observer that records phases and events (as STATUSTEXT, too) before `observer`."""
+        """An observer that records phases and events (as STATUSTEXT, too) and calls `observer`."""
         clock = asyncio.get_running_loop().time
         text_frames = TextFrames(self._config.link.source_system)
 

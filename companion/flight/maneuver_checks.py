@@ -57,7 +57,7 @@ def require_flyable(config: Config, maneuver: Maneuver, drag: KnownDrag) -> None
 def require_inside(
     config: Config, maneuvers: Iterable[Maneuver], origin: LatLon | None, drag: KnownDrag
 ) -> None:
-    """Check that all maneuvers stay inside the fence, even if it is in latitude and longitude.
+    """Check that all maneuvers stay inside the fence, also a fence in latitude and longitude.
 
     `origin`: geographic position where control begins, or None.
 
@@ -136,7 +136,7 @@ def naming_trajectory_errors(name: str | Path) -> Iterator[None]:
     """Name the maneuver or file in the error of a trajectory that cannot be computed.
 
     Raises:
-        ConfigError: instead of `TrajectoryError`.
+        ConfigError: the block raised a `TrajectoryError`.
     """
     try:
         yield

@@ -38,7 +38,7 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
 
 
 def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:
-    """A copy of the sequence that has not begun: a `Follow` stores the pose where it began."""
+    """A copy that can begin anew: a `Follow` of the original may store the pose where it began."""
     return ManeuverSequence(
         [
             replace(maneuver, _turned_trajectory=None, _pose=None)

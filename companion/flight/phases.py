@@ -88,7 +88,7 @@ def opening_phases(config: FlightConfig) -> tuple[Phase, ...]:
 def flight_phases(
     config: FlightConfig, maneuver_duration: float, autopilot: Autopilot
 ) -> tuple[Phase, ...]:
-    """The phases after the ground phases, in the autopilot's order; `maneuver_duration` in s."""
+    """The phases after the ground phases, in order; `maneuver_duration` in s."""
     maneuvers = control_phase(
         "maneuvers", "the maneuver to end", control_phases.maneuvers, maneuver_duration
     )
@@ -99,7 +99,7 @@ def flight_phases(
 
 
 def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
-    """The phases from the ground until the autopilot obeys our rates, in the autopilot's order."""
+    """The phases from the ground until the autopilot obeys our rates; PX4 gets setpoints first."""
     stream = Phase("stream", "the first setpoints", preflight_phases.stream, _COMMAND_TIMEOUT)
     return (
         *((stream,) if autopilot.control_entry is ControlEntry.BY_COMMAND else ()),

@@ -169,9 +169,9 @@ async def _arm(context: FlightContext) -> None:
 
 
 async def wait_until_armed(context: FlightContext, armed: Callable[[], bool]) -> None:
-    """Wait until `armed` shows an arming in a heartbeat, but not for long; raises what it raises.
+    """Wait until `armed` is true, at most `_ARMED_REPORT_TIMEOUT`; raises what `armed` raises.
 
-    The newest heartbeat may be older than the arming.
+    The wait is needed because the newest heartbeat may be older than the arming.
     """
     with suppress(TimeoutError):
         async with asyncio.timeout(_ARMED_REPORT_TIMEOUT):

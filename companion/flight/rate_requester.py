@@ -46,7 +46,7 @@ class RateRequester:
         self._last_silence = -inf
 
     def check(self, now: float, health: Health) -> None:
-        """Request each message whose rate is too low at `now`, our clock, s."""
+        """Request each message whose rate is too low at `now`, s of event-loop time."""
         settings = self._link_config
         answer_rate, position_rate = health.answer_rate, health.position_rate
         # After a request, one more gap may have another cause; a low rate causes two at once.
@@ -68,7 +68,7 @@ class RateRequester:
         """Request each status that has come before, is overdue at `now`, and has a requested rate.
 
         Args:
-            now: our clock, s.
+            now: event-loop time, s.
             heartbeat_limit: age from which the mode counts as unknown, s.
         """
         state, wanted_rates = self._link.state, self._link.autopilot.wanted_rates

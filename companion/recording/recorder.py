@@ -88,7 +88,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.put((time, encoder, values))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Record metadata."""
+        """Record `values` as the metadata record `name`."""
         self.add(self._clock(), _metadata, (name, values))
 
     def begin(self, start_time: float, values: Mapping[str, str]) -> None:

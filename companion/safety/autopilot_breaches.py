@@ -93,7 +93,7 @@ def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def heading_drift(limit: float) -> BreachCheck:
-    """The estimated heading turned by more than `limit` in 20 s, rad; the vehicle did not."""
+    """The estimated heading turned by more than `limit`, rad, in 20 s; the vehicle did not turn."""
     return above(
         limit,
         lambda snapshot: snapshot.resets.heading_drift,

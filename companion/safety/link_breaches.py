@@ -18,8 +18,8 @@ def silence(
     """No setpoint was sent for longer than `limit` s.
 
     `vehicle_heard`: True: the check applies only while frames come from the vehicle; False: only
-    while no frames come. `planner`, `guidance`: names of both in the
-    configuration, for the message.
+    while no frames come. `planner`, `guidance`: names of the configured planner and guidance, for
+    the message.
     """
 
     def check(snapshot: Snapshot, _: bool) -> str | None:

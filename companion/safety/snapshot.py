@@ -56,7 +56,8 @@ class Motion(NamedTuple):
 class Control(NamedTuple):
     """Times of the last data and of the last answer, and why the newest sample is unanswered.
 
-    Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
+    Times are in s of event-loop time; inf: not known, which is no breach. A sample is answered when
+    a setpoint is sent for it.
     """
 
     last_answered_arrival: float = inf

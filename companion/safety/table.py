@@ -160,5 +160,5 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
 
 
 def fence_of(config: Config) -> Fence:
-    """The fence of `limits` and `safety`, allowing for an estimate late by `_ESTIMATE_DELAY`."""
+    """The fence of `limits` and `safety`, with `_ESTIMATE_DELAY` as the delay of the estimate."""
     return replace(config.fence, estimate_delay=_ESTIMATE_DELAY)

@@ -1,4 +1,4 @@
-"""Keeps the fence of served flights in place until the vehicle is disarmed."""
+"""Keeps the fence in place from one client's flight to the next, until the vehicle is disarmed."""
 
 from math import dist
 

@@ -1,4 +1,4 @@
-"""The report pages of served flights, each written by a separate process."""
+"""The report pages of flights under a client's control, each written by a separate process."""
 
 import os
 import subprocess

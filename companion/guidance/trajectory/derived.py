@@ -90,7 +90,7 @@ class SlowedPart(NamedTuple):
 
 
 class SlowDown(NamedTuple):
-    """A trajectory within its limits.
+    """Result of `slow_down`: a trajectory that keeps the limits.
 
     Attributes:
         trajectory: the trajectory that keeps the limits.

@@ -41,8 +41,8 @@ _LONGEST_RAMP_FRACTION = 0.5
 class _Quantity(NamedTuple):
     """A derivative in a file, and the RMS by which it may differ from the spline's derivative.
 
-    This is absolute_tolerance + relative_tolerance · RMS of the derivative. The tolerance is needed
-    because published accelerations may jump, and the acceleration of a spline cannot.
+    The permitted RMS is absolute_tolerance + relative_tolerance · RMS of the derivative. It is
+    needed because published accelerations may jump, and the acceleration of a spline cannot.
 
     Attributes:
         name: name of the derivative in messages.

@@ -131,7 +131,7 @@ def _spline_through(knots: Floats, positions: Floats) -> SepticSpline:
 
 
 def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Mask (k, 4) of fixed states: the values where `values` (k,) is true, rest at both ends."""
+    """Mask (k, 4) of fixed states: each value where `values` (k,) is true; both ends at rest."""
     mask = np.zeros((values.size, STATE_SIZE), dtype=bool)
     mask[:, 0] = values
     mask[[0, -1], 1:] = True

@@ -142,7 +142,7 @@ def _used_values(
 
 
 def _heading(message: Message) -> tuple[float | None, float | None]:
-    """Yaw and yaw rate; None for what the mask excludes."""
+    """Yaw, rad, and yaw rate, rad/s; None for what the mask excludes."""
     mask = message.type_mask
     yaw = None if mask & _NO_YAW else message.yaw
     rate = None if mask & _NO_YAW_RATE else message.yaw_rate

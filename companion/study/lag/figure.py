@@ -130,7 +130,10 @@ def _draw_cross_track_by(
 def _draw_cross_tracks(
     axes: Axes, values: Sequence[float], comparisons: Sequence[Comparison]
 ) -> None:
-    """Draw the cross-track error of every method over the condition that the comparisons vary."""
+    """Draw the cross-track error of every method over `values`.
+
+    `values`: lag, dead time or sample rate of each comparison.
+    """
     for method in METHODS:
         cross_tracks = [comparison.by_method[method].cross_track for comparison in comparisons]
         axes.plot(values, cross_tracks, marker=".", **method.line_style)

@@ -117,7 +117,7 @@ class Comparison(NamedTuple):
 
     @property
     def worst_error(self) -> DelayMismatch:
-        """The error of lag and dead time with the largest cross-track error of model-following."""
+        """The wrong lag and dead time that give model-following its largest cross-track error."""
         errors = [error for error in self.model_following_scores if error != NO_ERROR]
         return max(errors, key=lambda error: self.model_following_scores[error].cross_track)
 
