@@ -157,7 +157,7 @@ class PreflightChecks:
             self._note_once(f"preflight warnings: {', '.join(warnings)}; see `companion doctor`")
         for finding in unsafe_findings(findings):
             if finding not in blocking:
-                self._note_once(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
+                self._note_once(f"unsafe, but accepted by flight.accept: {finding.sentence()}")
         if blocking:
             raise FlightEnded("; and ".join(finding.sentence() for finding in blocking))
 
