@@ -24,6 +24,9 @@ _MODE_REPORT_TIMEOUT = 1.0
 _REASON_TEXT_DELAY = 0.3
 """Largest time between a mode change and the STATUSTEXT that gives the reason, s."""
 _FAILSAFE_TEXT = "the autopilot's failsafe took over"
+_UNWATCHED_TIME = 3.0
+"""Longest time from a long stall of this program to a heartbeat from after the stall, s."""
+_ON_GROUND_TEXT = "the vehicle stands on the ground, disarmed: it landed or fell unwatched"
 
 IsDone = Callable[[], bool]
 """Returns whether the vehicle has obeyed the command; may raise `FlightEnded` instead."""
@@ -74,7 +77,13 @@ def require_armed_in_air(context: FlightContext) -> None:
         FlightEnded: the vehicle is disarmed, and has not been on the ground all the time.
     """
     if context.link.state.armed is False and not context.ground.standing:
-        raise FlightEnded(DISARMED_IN_FLIGHT, Exit.RELEASE)
+        counters, now = context.snapshot_builder.counters, asyncio.get_running_loop().time()
+        was_stopped = now - counters.long_stall_ended_at < _UNWATCHED_TIME
+        raise (_DisarmedUnwatched if was_stopped else FlightEnded)(DISARMED_IN_FLIGHT, Exit.RELEASE)
+
+
+class _DisarmedUnwatched(FlightEnded):
+    """The vehicle is disarmed; this program was stopped when it disarmed."""
 
 
 class ModeTakenOver(FlightEnded):
@@ -87,11 +96,15 @@ def _taken_over(link: Link) -> ModeTakenOver:
 
 
 async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
-    """Return `ended`, with the autopilot's geofence as reason if it has changed the mode.
+    """Return `ended`, with the reason that the telemetry after it shows.
 
-    ArduPilot reports a geofence breach only in a STATUSTEXT. Control is released before this
-    function waits for the text.
+    ArduPilot reports a geofence breach only in a STATUSTEXT, and a failsafe may have landed the
+    vehicle while this program was stopped. Control is released before this function waits.
     """
+    if isinstance(ended, _DisarmedUnwatched):
+        context.release()
+        await asyncio.sleep(_REASON_TEXT_DELAY)  # a vehicle disarmed in the air falls by now
+        return FlightEnded(_ON_GROUND_TEXT, ended.exit) if context.ground.resting else ended
     if not isinstance(ended, ModeTakenOver | ControlReleased):
         return ended
     state, fence_text = context.link.state, context.link.autopilot.fence_text

@@ -35,6 +35,9 @@ _SHORTEST_LIFT_OFF_TIMEOUT = 10.0
 """Shortest time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full
 thrust meanwhile."""
 
+_SHORTEST_STALL = 0.5
+"""A longer time between two checks of the climb is a stall of this program, s."""
+
 _LIFT_OFF_FRACTION = 0.25
 """Part of flight.takeoff_timeout_s allowed to leave the ground: some motors spool up for 10 s."""
 
@@ -101,7 +104,7 @@ class _Climb:
 
     def __init__(self, context: FlightContext, height: float) -> None:
         self._context, self._height = context, height
-        self._began = asyncio.get_running_loop().time()
+        self._began = self._last_check = asyncio.get_running_loop().time()
         timeout = _LIFT_OFF_FRACTION * context.config.flight.takeoff_timeout_s
         self._lift_off_timeout = max(_SHORTEST_LIFT_OFF_TIMEOUT, timeout)
         self._mode_before = context.link.state.mode
@@ -123,6 +126,7 @@ class _Climb:
     def is_over(self) -> bool:
         """Whether the height is reached; raise `FlightEnded` if somebody stopped the climb."""
         context, state = self._context, self._context.link.state
+        self._leave_out_stall()
         if not context.armed():
             raise FlightEnded(
                 "the pilot, the autopilot or another station disarmed the vehicle during the "
@@ -149,6 +153,13 @@ class _Climb:
             self._require_leaving_ground(height)
             return False  # a vehicle that stands must not be taken over: the thrust would lift it
         return is_near_height and climb_has_ended(context)
+
+    def _leave_out_stall(self) -> None:
+        """Let no time count in which this program was stopped: the vehicle may have climbed."""
+        now = asyncio.get_running_loop().time()
+        since_check, self._last_check = now - self._last_check, now
+        if since_check > _SHORTEST_STALL:
+            self._began += since_check
 
     def _was_stopped(self) -> bool:
         """Whether the mode changed from take-off to hold more than `_ARRIVAL_TIMEOUT` ago."""

@@ -9,6 +9,7 @@ probes show that setpoints come late or are lost.
 import asyncio
 from collections import deque
 from collections.abc import Callable
+from math import inf
 from typing import NamedTuple
 
 from companion.mavlink.dispatcher import MessageDispatcher
@@ -20,6 +21,8 @@ from companion.vehicle.clock_estimates import EXCHANGE_LIFETIME
 # The first exchanges follow quickly, so that the clock offset is good after a second.
 _QUICK_EXCHANGES, _QUICK_EXCHANGE_PERIOD_S = 10, 0.1
 _EXCHANGE_PERIOD_S = 1.0
+_STALLED_PERIOD_S = 1.5
+"""A longer period, s, is a stall of this program; so long after it, missing answers say nothing."""
 _NS_PER_S, _S_PER_NS = 1e9, 1e-9
 _PROBE_PERIOD_NS = 0.1 * _NS_PER_S
 _UPLINK_WINDOW_NS = 0.7 * _NS_PER_S
@@ -117,10 +120,16 @@ class TimeSync:
         for _ in range(_QUICK_EXCHANGES):
             self.send_exchange_request()
             await asyncio.sleep(_QUICK_EXCHANGE_PERIOD_S)
+        stalled_at = -inf
         while True:
             self.send_exchange_request()
+            sent = self._clock()
             await asyncio.sleep(_EXCHANGE_PERIOD_S)
-            self._vehicle_clock.update(self._clock())
+            now = self._clock()
+            if now - sent > _STALLED_PERIOD_S:
+                stalled_at = now
+            if now - stalled_at > _STALLED_PERIOD_S:
+                self._vehicle_clock.update(now)
 
     def send_exchange_request(self) -> None:
         """Send the request of one exchange."""
