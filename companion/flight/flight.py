@@ -184,7 +184,9 @@ class Flight:
             await cancel(task)
 
     def _usual_exit(self) -> Exit:
-        return self.phase.exit_on_failure(standing=self._context.ground.standing)
+        ground, loop = self._context.ground, self._context.loop
+        taken = loop.taking_over or loop.offboard_active
+        return self.phase.exit_on_failure(standing=ground.standing, taken=taken)
 
     async def _leave(self, exit_: Exit) -> None:
         """Run the exit, then land if the user wants to; a failure is noted, not raised."""
