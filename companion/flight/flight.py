@@ -6,7 +6,7 @@ from contextlib import aclosing
 from math import inf
 from typing import Any
 
-from companion.flight.commands import with_cause
+from companion.flight.cause import with_cause
 from companion.flight.context import FlightContext, cancel, wait_for_first
 from companion.flight.observer import Observer
 from companion.flight.phase import Phase

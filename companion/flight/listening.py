@@ -47,15 +47,18 @@ def _obeys_setpoints(context: FlightContext) -> bool:
 
 def _note_left_alone(context: FlightContext, reason: str = "") -> None:
     armed = "armed" if context.armed() else "disarmed"
+    detector = context.replacement_detector  # ends the flight by itself if it shows another vehicle
+    restart = detector.restart_in_words() if detector.is_same_vehicle else None
     context.note(
         f"the vehicle is heard again, {armed} in {context.link.state.mode}{reason}: "
-        "nothing is commanded"
+        f"nothing is commanded{'' if restart is None else f'; {restart}'}"
     )
 
 
 async def _hold_if_ours(context: FlightContext) -> None:
     """Command a vehicle that is heard again, and still obeys us, until it holds."""
     context.waiting_for = "the vehicle's heartbeat"
+    context.link.timesync.send_exchange_request()  # its answer shows a restart
     await context.fresh_heartbeat()  # only now, because a request during the silence is lost
     mode = context.link.state.mode
     lost_in_takeoff = context.armed() and await is_in_our_takeoff(context)

@@ -17,10 +17,14 @@ from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.clock_estimates import EXCHANGE_LIFETIME
+from companion.vehicle.clock_jumps import RESTART_SETBACK, describe_change
 
 # The first exchanges follow quickly, so that the clock offset is good after a second.
 _QUICK_EXCHANGES, _QUICK_EXCHANGE_PERIOD_S = 10, 0.1
 _EXCHANGE_PERIOD_S = 1.0
+_JUST_BOOTED = 60.0
+"""Longest time since boot of a vehicle that has just restarted, s; no other clock shows so little.
+"""
 _STALLED_PERIOD_S = 1.5
 """A longer period, s, is a stall of this program; so long after it, missing answers say nothing."""
 _NS_PER_S, _S_PER_NS = 1e9, 1e-9
@@ -96,6 +100,10 @@ class TimeSync:
     Args:
         clock: returns the event-loop time, s.
         vehicle_clock: takes each exchange of request and answer.
+
+    Attributes:
+        restart_count: counts answers whose time went back to that of a vehicle which just booted.
+        last_restart: the newest of these restarts in words; empty before the first.
     """
 
     def __init__(
@@ -106,6 +114,7 @@ class TimeSync:
         vehicle_clock: VehicleClock,
     ) -> None:
         self._outbox, self._clock, self._vehicle_clock = outbox, clock, vehicle_clock
+        self.restart_count, self.last_restart, self._vehicle_time = 0, "", -inf
         self.reset()
         dispatcher.subscribe("TIMESYNC", self._on_timesync)
 
@@ -184,6 +193,14 @@ class TimeSync:
         elif not self._probes.take_answer(sent_ns, now_ns):  # it answers another station
             return
         self._newest_answered_ns = max(sent_ns, self._newest_answered_ns or 0)
+        self._notice_restart(message.tc1 * _S_PER_NS)
+
+    def _notice_restart(self, vehicle_time: float) -> None:
+        before, self._vehicle_time = self._vehicle_time, vehicle_time
+        if vehicle_time < min(before - RESTART_SETBACK, _JUST_BOOTED):
+            self.restart_count += 1
+            setback = vehicle_time - before
+            self.last_restart = describe_change(setback, before, vehicle_time, set_back=True)
 
     def _recent_round_trips(self) -> list[float]:
         return self._exchanges.round_trips(since_ns=self._now_ns() - EXCHANGE_LIFETIME * _NS_PER_S)
