@@ -166,9 +166,8 @@ class Flight:
     async def _run_until_end(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:
         """Run `work` until it is done, the flight is ended, or `seconds`, less stalls, are over."""
         task = asyncio.create_task(work)
-        awaited: set[asyncio.Future[Any]] = {task, self._end_future}
         try:
-            await wait_for_first(awaited, seconds)
+            await wait_for_first({task, self._end_future}, seconds)
             if self._end_future.done():
                 return None
             if not task.done():
@@ -184,9 +183,10 @@ class Flight:
             await cancel(task)
 
     def _usual_exit(self) -> Exit:
-        ground, loop = self._context.ground, self._context.loop
-        taken = loop.taking_over or loop.offboard_active
-        return self.phase.exit_on_failure(standing=ground.standing, taken=taken)
+        context = self._context
+        taken = context.loop.taking_over or context.loop.offboard_active
+        exit_ = self.phase.exit_on_failure(standing=context.ground.standing, taken=taken)
+        return Exit.LEAVE if exit_ is Exit.DISARM and not context.must_disarm else exit_
 
     async def _leave(self, exit_: Exit) -> None:
         """Run the exit, then land if the user wants to; a failure is noted, not raised."""

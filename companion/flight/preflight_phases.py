@@ -105,13 +105,8 @@ async def arm(context: FlightContext) -> None:
 
 
 async def undo_arming(context: FlightContext) -> None:
-    """Disarm if we armed the vehicle or commanded the take-off; otherwise leave it as it is.
-
-    After our take-off command, a vehicle that the pilot armed is disarmed, too: it may still climb.
-    """
+    """Disarm the vehicle that we armed, or whose take-off we commanded: it may still climb."""
     context.release()
-    if not context.must_disarm:
-        return
     context.waiting_for = "the autopilot to accept disarming"
 
     def require_control() -> None:
