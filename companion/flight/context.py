@@ -211,6 +211,19 @@ class FlightContext:
             return None
         return tilt_angle(sample.q[1], sample.q[2])
 
+    def heard_instead(self) -> str:
+        """Other systems that are heard, as a clause for the user; "" if there is none.
+
+        A vehicle may come back from a restart with another system id.
+        """
+        link = self.config.link
+        sources = self.link.stats.foreign_sources
+        systems = {system for system, component in sources if component == link.target_component}
+        if not systems:
+            return ""
+        names = ", ".join(map(str, sorted(systems)))
+        return f"; system {names} is heard, but link.target_system is {link.target_system}"
+
     def armed(self) -> bool:
         """Whether the autopilot reports that the vehicle is armed."""
         return self.link.state.armed is True

@@ -35,6 +35,7 @@ async def hold_when_heard(context: FlightContext) -> None:
             await _hold_if_ours(context)
     except TimeoutError:
         if not was_heard:
+            context.waiting_for += context.heard_instead()
             raise context.timed_out(_LISTENING_TIMEOUT, "the vehicle to be heard") from None
         if _obeys_setpoints(context):
             raise context.timed_out(_HOLD_TIMEOUT, "the vehicle to hold", Exit.LAND) from None
