@@ -1,7 +1,7 @@
 """The phase in which the autopilot takes off."""
 
 import asyncio
-from math import degrees, dist, radians
+from math import degrees, radians
 
 from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import FlightContext
@@ -15,11 +15,8 @@ _MAX_HOLDING_CLIMB_SPEED = 0.3
 MAX_UNDERSHOOT = 0.5
 """A climb may end this far below the commanded height, m."""
 
-_MAX_OVERSHOOT = 3.0
+MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
-
-_LARGEST_DRIFT = 3.0
-"""Largest distance by which wind carries a vehicle in its climb, m; else somebody flew it away."""
 
 _ARRIVAL_TIMEOUT = 2.0
 """Time allowed to reach altitude after the mode changed to hold, s; then the climb has failed."""
@@ -80,23 +77,17 @@ async def takeoff(context: FlightContext) -> None:
     await context.until(climb.is_over)
 
 
-async def is_in_our_takeoff(context: FlightContext) -> bool:
-    """Whether a vehicle that is heard again takes off for us, or holds at the take-off height.
+def require_steady_heading(context: FlightContext) -> None:
+    """Raise `FlightEnded` if the heading jumped in our take-off more than it may in our control.
 
-    If the vehicle holds lower or elsewhere, somebody else has stopped it or flown it there.
+    The autopilot holds with the same heading: the sooner it lands, the less far it is carried.
     """
-    state, takeoff_position = context.link.state, context.takeoff_position
-    if takeoff_position is None:
-        return False
-    position = await context.next_position()
-    if dist(takeoff_position, position.position_ned[:2]) > _LARGEST_DRIFT:
-        return False
-    if in_role(context.link, Role.TAKEOFF):
-        return True
-    if not in_role(context.link, Role.READY) or state.mode_by_failsafe or state.height is None:
-        return False
-    height_error = state.height - context.config.flight.takeoff_height_m
-    return -MAX_UNDERSHOOT < height_error < _MAX_OVERSHOOT
+    jump, limit = abs(context.loop.resets.frame.offset), context.config.safety.max_reset_angle
+    if context.takeoff_position is not None and jump > limit:
+        raise FlightEnded(
+            f"not taken over: the estimated heading jumped by {degrees(jump):.0f}° in the climb, "
+            f"more than safety.max_reset_deg = {degrees(limit):g}; check the compass"
+        )
 
 
 class _Climb:
@@ -133,11 +124,12 @@ class _Climb:
                 "take-off",
                 Exit.RELEASE,
             )
+        require_steady_heading(context)
         height, position = state.height, context.fresh_position()
         if height is None or position is None:
             return False
         context.waiting_for = f"{self._height:g} m, now {height:.1f} m"
-        if height > self._height + _MAX_OVERSHOOT:
+        if height > self._height + MAX_OVERSHOOT:
             raise self._jump_failure(height) or FlightEnded(
                 f"the vehicle climbed to {height:.1f} m, but flight.takeoff_height_m is "
                 f"{self._height:g}"
@@ -216,7 +208,7 @@ class _Climb:
         too_low = height < self._height
         if too_low and climbed_height <= self._height - MAX_UNDERSHOOT:
             return None
-        if not too_low and climbed_height > self._height + _MAX_OVERSHOOT:
+        if not too_low and climbed_height > self._height + MAX_OVERSHOOT:
             return None
         return FlightEnded(
             f"after a climb of {climbed_height:.1f} m the height above home is {height:.1f} m: "

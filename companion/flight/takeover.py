@@ -15,7 +15,11 @@ from companion.flight.preflight_phases import (
     use_evidence,
     wait_until_armed,
 )
-from companion.flight.takeoff import MAX_UNDERSHOOT, climb_has_ended
+from companion.flight.takeoff import (
+    MAX_UNDERSHOOT,
+    climb_has_ended,
+    require_steady_heading,
+)
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
@@ -142,7 +146,9 @@ async def offboard(context: FlightContext) -> None:
     """Check the vehicle again, take over, and hold for `_SETTLE_TIME`."""
     context.waiting_for = "the preflight checks before the takeover"
     await context.preflight.require_within(_LONGEST_DISTURBANCE, Stage.AIRBORNE)
+    require_steady_heading(context)
     await _wait_until_held(context)
+    require_steady_heading(context)
     await _require_learned_hover(context)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
