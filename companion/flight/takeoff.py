@@ -86,7 +86,8 @@ def require_steady_heading(context: FlightContext) -> None:
     if context.takeoff_position is not None and jump > limit:
         raise FlightEnded(
             f"not taken over: the estimated heading jumped by {degrees(jump):.0f}° in the climb, "
-            f"more than safety.max_reset_deg = {degrees(limit):g}; check the compass"
+            f"more than safety.max_reset_deg = {degrees(limit):g}; check the compass",
+            Exit.LAND,
         )
 
 
