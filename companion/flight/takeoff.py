@@ -3,6 +3,8 @@
 import asyncio
 from math import degrees, radians
 
+from companion.attitude import heading
+from companion.attitude.representation import wrap_angle
 from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import FlightContext
 from companion.preflight.evidence import Stage
@@ -29,8 +31,7 @@ _TIPPED_TILT = radians(60.0)
 detector."""
 
 _SHORTEST_LIFT_OFF_TIMEOUT = 10.0
-"""Shortest time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full
-thrust meanwhile."""
+"""Shortest time to leave the ground, s; PX4 needs 4 s. Blocked motors get full thrust meanwhile."""
 
 _SHORTEST_STALL = 0.5
 """A longer time between two checks of the climb is a stall of this program, s."""
@@ -77,17 +78,19 @@ async def takeoff(context: FlightContext) -> None:
     await context.until(climb.is_over)
 
 
-def require_steady_heading(context: FlightContext) -> None:
+def require_steady_heading(context: FlightContext, jump_on_ground: float = 0.0) -> None:
     """Raise `FlightEnded` if the heading jumped in our take-off more than it may in our control.
 
     The autopilot holds with the same heading: the sooner it lands, the less far it is carried.
+    `jump_on_ground`: jump while the vehicle still stood, rad.
     """
-    jump, limit = abs(context.loop.resets.frame.offset), context.config.safety.max_reset_angle
+    jump = max(abs(jump_on_ground), abs(context.loop.resets.frame.offset))
+    limit = context.config.safety.max_reset_angle
     if context.takeoff_position is not None and jump > limit:
         raise FlightEnded(
-            f"not taken over: the estimated heading jumped by {degrees(jump):.0f}° in the climb, "
-            f"more than safety.max_reset_deg = {degrees(limit):g}; check the compass",
-            Exit.LAND,
+            f"not taken over: the estimated heading jumped by {degrees(jump):.0f}° in the "
+            f"take-off, more than safety.max_reset_deg = {degrees(limit):g}; check the compass",
+            None if context.ground.standing else Exit.LAND,
         )
 
 
@@ -103,6 +106,7 @@ class _Climb:
         self._has_begun = False
         self._hold_began: float | None = None
         self._ground_flag_at_height_since: float | None = None
+        self._start_heading = _heading(context)
         motion = context.guidance_loop.motion
         self._start_down = None if motion is None else motion.position_ned[2]
 
@@ -125,7 +129,7 @@ class _Climb:
                 "take-off",
                 Exit.RELEASE,
             )
-        require_steady_heading(context)
+        require_steady_heading(context, self._jump_on_ground())
         height, position = state.height, context.fresh_position()
         if height is None or position is None:
             return False
@@ -146,6 +150,11 @@ class _Climb:
             self._require_leaving_ground(height)
             return False  # a vehicle that stands must not be taken over: the thrust would lift it
         return is_near_height and climb_has_ended(context)
+
+    def _jump_on_ground(self) -> float:
+        """Jump of the heading of a vehicle that still stands, rad; there `resets` forgets it."""
+        standing = self._context.ground.standing
+        return wrap_angle(_heading(self._context) - self._start_heading) if standing else 0.0
 
     def _leave_out_stall(self) -> None:
         """Let no time count in which this program was stopped: the vehicle may have climbed."""
@@ -216,6 +225,12 @@ class _Climb:
             "home or the height estimate has jumped",
             Exit.LAND,
         )
+
+
+def _heading(context: FlightContext) -> float:
+    """The estimated heading, rad; 0 before the first attitude."""
+    sample = context.loop.resets.newest_attitude
+    return 0.0 if sample is None else heading(sample.q)
 
 
 def _require_ground(context: FlightContext) -> None:

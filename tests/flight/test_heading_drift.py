@@ -55,7 +55,19 @@ def test_a_heading_that_jumps_in_the_climb_lands_the_vehicle_before_it_flies_awa
         summary = fly(mock)
         truth = mock.state()
     assert summary.result.startswith(
-        "not taken over: the estimated heading jumped by 170° in the climb"
+        "not taken over: the estimated heading jumped by 170° in the take-off"
     ), summary.events
     assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
     assert farthest < 2.0
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_heading_that_jumps_before_the_vehicle_lifts_off_disarms_it(autopilot):
+    """On the ground a jump was accepted as it is, and ArduPilot's own hold flew 113 m away."""
+    with mock_vehicle(autopilot=autopilot) as mock:
+        jump = {"kind": "estimator_reset", "yaw_deg": 170.0}
+        summary = fly(mock, None, When("takeoff", lambda: mock.inject(jump), after=0.0))
+        truth = mock.state()
+    assert "the estimated heading jumped by 170° in the take-off" in summary.result, summary.events
+    assert (truth["armed"], truth["crashed"]) == (False, False)
+    assert -truth["position"][2] < 0.3
