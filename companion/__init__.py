@@ -61,5 +61,5 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """The public names too, so that an interactive Python completes them before their import."""
+    """All names, also those not imported yet, so that an interactive Python completes them."""
     return sorted({*globals(), *_PUBLIC_NAMES})

@@ -39,7 +39,7 @@ class Drag(NamedTuple):
     def deceleration_rate(
         self, velocity: tuple[Number, Number, Number], acceleration: tuple[Number, Number, Number]
     ) -> tuple[Number, Number, Number]:
-        """Time derivative of `deceleration`, m/s³, at an airspeed vector and its derivative."""
+        """Time derivative of `deceleration`, m/s³; `velocity` is the airspeed, m/s."""
         speed = _smooth_speed(velocity)
         per_velocity = self.linear + self.quadratic * speed
         north, east, down = velocity

@@ -26,7 +26,7 @@ _MEMORY_REMEDY = (
 
 
 def use_normal_scheduler(pid: int) -> None:
-    """Give a child process the normal scheduler instead of that of this program."""
+    """Give a child process the normal scheduler, whichever this program itself uses."""
     with suppress(ProcessLookupError):  # it has ended already
         os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
@@ -122,7 +122,7 @@ def request_settings(settings: RealtimeSettings) -> Iterator[tuple[SettingResult
     """Request all settings; undo the granted ones at the end of the block.
 
     Raises:
-        RealtimeError: a setting is refused although `required`.
+        RealtimeError: a setting is refused, and `settings.required` is true.
     """
     results: list[SettingResult] = []
     with ExitStack() as undo:

@@ -62,7 +62,7 @@ def naming_user_code(
 
 
 def _innermost_trajectory(code: object) -> object:
-    """The user's trajectory, if trajectories of this program are around it; else `code`."""
+    """The user's trajectory that `code`, a trajectory of this program, wraps; else `code`."""
     while _package(type(code).__module__) == _OUR_PACKAGE and hasattr(code, "trajectory"):
         code = code.trajectory
     return code

@@ -69,7 +69,7 @@ def reply(simulation: Simulation, request: bytes) -> bytes:
 
 
 def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
-    """Inject a fault, given as in the configuration; without a start it begins in the next slot.
+    """Inject a fault, given as in the configuration; without a start it begins in the next step.
 
     Raises:
         ConfigError: the fault has an unknown kind, an unknown key or an invalid value; the message

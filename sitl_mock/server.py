@@ -173,7 +173,7 @@ class Server:
     # Real time
 
     def _await_client(self) -> None:
-        """Wait until a client connects, if the endpoint can know that; the vehicle boots then."""
+        """Wait until a client connects over TCP; UDP and serial links do not wait."""
         while not self._companion.connected:
             self._connections.wait_for_input(BEACON_PERIOD_S)
 

@@ -64,7 +64,8 @@ def load_settings(
 ) -> MockSettings:
     """Read the ``mock:`` section of a YAML file; without a file, the defaults.
 
-    ``overrides`` replace keys of the section and of ``lockstep``; messages call them ``origin``.
+    ``overrides`` replace keys of the section and of ``lockstep``. Without a file, error
+    messages name ``origin`` as their source.
 
     Raises:
         ConfigError: the file cannot be read, or a key or value is invalid.

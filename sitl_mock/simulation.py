@@ -24,7 +24,7 @@ from sitl_mock.settings import MockSettings
 _SYSTEM_TIME = dialect.MAVLink_system_time_message
 
 COMMANDER_PERIOD_US = 50_000
-"""Period of the commander (arming, modes, failsafes), vehicle time."""
+"""Period of the commander (arming, modes, failsafes) in vehicle time, us."""
 
 
 class Simulation:

@@ -64,8 +64,8 @@ class SharedLoop:
 class OwnThreadLoop:
     """Runs the flight in a thread of its own, which is started at once.
 
-    If the program's loop or thread ends without `close`, the flight hands the vehicle back. The
-    interpreter waits for that before it ends.
+    If the program's loop or thread ends without `close`, the flight hands the vehicle back. Python
+    waits for the end of this hand-back before it exits.
 
     Attributes:
         time: returns the time of the flight's loop, s.
@@ -191,6 +191,6 @@ async def call_in_thread(function: Callable[[*Arguments], T], *arguments: *Argum
 def _vehicle_waits() -> bool:
     """Whether the vehicle's time stands still while the event loop works, as in lockstep.
 
-    If it waits, a thread would only make the order of events random.
+    If time stands still, a thread would only make the order of events random.
     """
     return isinstance(asyncio.get_running_loop(), LockstepEventLoop)

@@ -103,7 +103,7 @@ class ProgramPlan:
             await self.finished.wait()
             self.require_flight()
         if self.has_requests:
-            raise RuntimeError("another call of this vehicle has not ended yet: await it first")
+            raise RuntimeError("another call on this vehicle has not ended yet: await it first")
         request = PhaseRequest(phases, ends_flight)
         self._waiting_requests.append(request)
         self._new_request.set()
@@ -169,13 +169,13 @@ def flight_ended(result: str) -> FlightEnded:
 
 
 def mark_error_retrieved(future: asyncio.Future[Any]) -> None:
-    """Done-callback without which asyncio would warn; the program's calls raise the error."""
+    """Done-callback that retrieves the error, so that asyncio does not warn about it."""
     if not future.cancelled():
         future.exception()
 
 
 def failure_text(name: str, error: BaseException) -> str:
-    """A clause that says how the program `name` failed: cancelled, dropped, or by an error."""
+    """A clause that says how the program `name` failed: cancelled, connection dropped, or error."""
     if isinstance(error, asyncio.CancelledError):
         return f"{name} was cancelled"
     if isinstance(error, GeneratorExit):  # as when the cell of a notebook runs once more

@@ -24,8 +24,8 @@ def straight_path(
 ) -> Trajectory:
     """A straight line, from rest to rest; for a distance of nearly 0, a hover.
 
-    `displacement_ned`: end of the line relative to its start, m. The other arguments are those of
-    `Vehicle.go_to`, with the `config` whose limits bound `_usual_speed`.
+    `displacement_ned`: end of the line relative to its start, m. Without a `speed`, the limits in
+    `config` bound the speed. The other arguments are those of `Vehicle.go_to`.
 
     Raises:
         TrajectoryError: a limit is not positive.

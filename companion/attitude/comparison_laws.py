@@ -58,7 +58,8 @@ def euler(
 ) -> tuple[float, float, float]:
     """Body rates p·M(φ, θ)·(wrapped errors of the Z-Y-X Euler angles), rad/s.
 
-    The response depends on the heading.
+    The matrix M converts derivatives of the Euler angles to body rates. The response depends on the
+    heading.
     """
     gain = constants.gain
     north, east, heading, heading_rate = target

@@ -39,7 +39,7 @@ class AxisLead:
         self._plans = plans
 
     def advance(self) -> None:
-        """Move on to the plan made for `plan_delay` seconds before the time of the newest plan."""
+        """Advance to the plan for the time `plan_delay` seconds before that of the newest plan."""
         plans = self._plans
         plan_time = plans.time - self._plan_delay
         self._plan = plans.tilt.at(plan_time) if self._plan_delay else plans.tilt.newest
@@ -78,8 +78,8 @@ class FeedForward:
     """Plans a smooth, straight motion within the limits, and the body rates that follow it.
 
     The `ReferenceModel` plans the coefficients, the `HeadingModel` the heading. `AxisLead`
-    compensates the lag of each axis. The rates take effect one dead time later. The axis with the
-    shorter dead time is delayed, so that roll and pitch take effect at the same time.
+    compensates the lag of each axis. A rate takes effect one dead time after it was sent. The axis
+    with the shorter dead time is delayed, so that roll and pitch take effect at the same time.
 
     Yaw responds slowly, so the heading changes while the vehicle tilts. `YawModel` predicts this
     from the yaw rates that were sent. Roll and pitch rates are along the body axes predicted for
@@ -169,7 +169,7 @@ class FeedForward:
         """Advance the plan by `dt` s; return lag-compensated body rates that follow it, rad/s.
 
         Args:
-            target: an admissible target.
+            target: target within the limits; see `limited_target`.
             start_heading: heading at the start of the plan, rad: the present heading of the body
                 minus its predicted turn since the start.
             yaw_feedback: feedback to add to the yaw rate, rad/s.

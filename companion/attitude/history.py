@@ -97,7 +97,7 @@ class PlanSeries(Generic[Plan]):
         return self._plans[-1]
 
     def at(self, time: float) -> Plan:
-        """The plan at `time`: interpolated between two plans, extrapolated before and after all."""
+        """The plan at `time`, interpolated; before the first and after the last, extrapolated."""
         later_index, fraction = locate_time(self._times, time)
         earlier_plan, later_plan = self._plans[later_index - 1], self._plans[later_index]
         return type(earlier_plan)(

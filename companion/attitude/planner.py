@@ -13,10 +13,11 @@ from companion.attitude.representation import limited_target, normalised, requir
 from companion.attitude.types import BodyRates, Quaternion, Target
 
 Law = Callable[[Quaternion, Target, float, Constants], tuple[float, float, float]]
-"""A control law on scalars: a unit quaternion, an admissible target, the sample period in s and
-the constants → body rates (roll, pitch, yaw) in rad/s.
+"""A control law on scalars: a unit quaternion, a target within the limits (`limited_target`), the
+sample period in s and the constants → body rates (roll, pitch, yaw) in rad/s.
 
-A batch passes quaternion and target as plain sequences, so a law unpacks them."""
+A batch passes quaternion and target as plain sequences, so a law must unpack them and not use names
+such as `target.north`."""
 
 
 class Planner(Protocol):

@@ -134,7 +134,7 @@ class ReferenceModel:
         return (later_roll - roll) / _DIFFERENCE_STEP, (later_pitch - pitch) / _DIFFERENCE_STEP
 
     def advance(self, target: Target, dt: float) -> None:
-        """Advance by `dt` seconds towards an admissible target."""
+        """Advance by `dt` seconds towards a target that `limited_target` has limited."""
         step_count = ceil(dt * self._constants.gain / _LARGEST_GAIN_TIMES_STEP)
         for _ in range(step_count):
             self._step(target, dt / step_count)

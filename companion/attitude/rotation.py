@@ -25,7 +25,7 @@ def attitude_of(north: float, east: float, heading: float) -> Quaternion:
 def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
     """The shorter rotation from `q` to `goal` in the body frame, q⁻¹ ⊗ q_d with w ≥ 0.
 
-    An exact half turn is equally short both ways; the same one is chosen for q and −q.
+    An exact half turn is equally short both ways; the same way is chosen for q and −q.
     """
     w, x, y, z = q
     w_d, x_d, y_d, z_d = goal
@@ -39,7 +39,7 @@ def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
 
 
 def first_nonzero_is_negative(x: float, y: float, z: float) -> bool:
-    """Whether the first nonzero component is negative: for v ≠ 0, true for either v or −v."""
+    """Whether the first nonzero component is negative: for v ≠ 0, true for one of v and −v."""
     return x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0)))
 
 

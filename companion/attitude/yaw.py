@@ -15,7 +15,8 @@ class HeadingModel:
     """Plans the heading ψ: ψ̈ = (v − ψ̇)/τ, v = k·(ψ_d − ψ) + ψ̇_d; v has a limit and a slew limit.
 
     Args:
-        yaw: the vehicle's response in yaw; τ is its lag.
+        constants: k is `yaw_gain`; `max_yaw_rate` limits v.
+        yaw: the vehicle's response in yaw: its lag is τ, its slew limit is that of v.
 
     Attributes:
         heading: planned heading ψ, rad, not wrapped.
@@ -42,7 +43,7 @@ class HeadingModel:
         self.turn_rate = self._v = turn_rate
 
     def advance(self, target: Target, dt: float) -> None:
-        """Advance by `dt` seconds towards an admissible target."""
+        """Advance by `dt` seconds towards a target that `limited_target` has limited."""
         wanted_v = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
         v_change = clamp(wanted_v, self._max_rate) - self._v
         v = self._v = self._v + clamp(v_change, self._acceleration * dt)

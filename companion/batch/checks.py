@@ -1,4 +1,4 @@
-"""Checks and limits arrays of attitudes and targets, each as a planner does a single one."""
+"""Checks and limits arrays of attitudes and targets, as a planner does with a single one."""
 
 from functools import cache
 from math import pi

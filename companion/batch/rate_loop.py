@@ -60,8 +60,8 @@ def fly_steps(
         planner: gives the law and its constants.
         axes: response of roll, pitch and yaw to commanded body rates.
         start: attitude, body → world.
-        targets: (samples, 4), admissible targets: coefficients north and east, heading in rad,
-            heading rate in rad/s.
+        targets: (samples, 4), targets within the limits: coefficients north and east, heading in
+            rad, heading rate in rad/s.
         steps_per_sample: simulation steps from one sample to the next.
 
     Raises:

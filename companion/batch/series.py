@@ -14,7 +14,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
 
 LARGEST_SQUARE = 0.25
-"""Largest argument of `cos_and_sinc`, rad²: a turn of 1 rad per sample."""
+"""Largest argument of `cos_and_sinc`, rad²: (0.5 rad)², for turns of at most 1 rad per sample."""
 
 
 def _polynomial_fit(

@@ -29,7 +29,7 @@ class Campaign:
     """A campaign: what to fly, and the files that the flights read."""
 
     file: CampaignFile
-    """Content of the campaign file. A trajectory in `file.sweep` is a path: a key of `files`."""
+    """Content of the campaign file. Trajectories in `file.sweep` are paths: keys of `files`."""
     base: Config
     """Configuration that the swept keys change; the keys of `set` are already applied. If
     `base.flight.trajectory` is set, it is a key of `files`."""
@@ -87,7 +87,7 @@ class Campaign:
         )
 
     def _new_value(self, name: str, key: str, value: Any) -> Any:
-        """The value that a key gets: `value`, or this times the base value if `times_base`."""
+        """The new value of a key: `value`, or with `times_base` the base value times `value`."""
         if not self.file.sweep[name].times_base or value is None:
             return value
         base_value = self._base_value(key)

@@ -73,7 +73,7 @@ class FaultScenario(Section):
         return _DEFAULT_FAULT_DELAYS_S[phase] if self.after_s is None else self.after_s
 
     def endings(self, phase: str) -> tuple[str, ...]:
-        """Permitted endings of a flight whose fault begins in `phase`; empty: none are named."""
+        """Permitted endings of a flight whose fault begins in `phase`; empty: not limited."""
         if isinstance(self.ends, dict):
             return {str(name): endings for name, endings in self.ends.items()}.get(phase, ())
         return self.ends

@@ -72,7 +72,7 @@ def run(
 
 
 def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
-    """How many flights each internal error of the program has ended; empty for a batch."""
+    """Number of flights that each internal error of the program has ended; empty for a batch."""
     if file.kind != "flights":
         return Counter()
     results = store.read(folder)["result"].to_pylist()
@@ -87,7 +87,7 @@ def run_on_cluster(
     `seconds_per_case` is the wall time that a case takes, s.
 
     Raises:
-        ClusterError: a unit was given up, or see `run_tasks`.
+        ClusterError: a unit was given up, or the connection to the scheduler is lost.
         ConfigError: see `run_tasks`.
     """
     unit_size = cases_per_unit(len(cases), seconds_per_case, number_of_workers(client))

@@ -26,7 +26,7 @@ from companion.config.files import load as load_config
 from companion.files import yaml_file
 from companion.files.yaml_file import ConfigError, nearest_place, validated
 from companion.flight.flown_config import copy_trajectory
-from companion.testing.settings import complete_mock
+from companion.testing.settings import mock_with_defaults
 
 TRAJECTORIES_FOLDER = "trajectories"
 """Folder of the copied trajectory files, in the folder of a campaign."""
@@ -111,7 +111,7 @@ class _CampaignReader:
         return replace_unchecked(base, flight={"arm": True, "trajectory": copied_path})
 
     def _with_copied_files(self, name: str, swept: SweptValues) -> SweptValues:
-        """The factor, with each path of a trajectory file replaced by that of its copy."""
+        """The factor, with each path of a trajectory file replaced by the path of its copy."""
         if TRAJECTORY not in swept.changed_keys(name):
             return swept
         listed_values = swept.values or swept.choice or ()
@@ -155,7 +155,7 @@ class _CampaignReader:
                         "take out at_s and after_offboard_s"
                     )
             try:
-                complete_mock({"faults": scenario_section.inject})
+                mock_with_defaults({"faults": scenario_section.inject})
             except ConfigError as error:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
         self._check_names(FAULT, (NO_FAULT, *file.faults))

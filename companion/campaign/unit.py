@@ -15,7 +15,7 @@ Row = dict[str, Value]
 LONGEST_UNIT_S = 2.5
 """Longest planned wall time of a unit with several cases, s.
 
-A unit takes long compared with the time to send it, and a lost unit costs little."""
+Such a unit takes much longer than its transfer to a worker, and its loss costs little time."""
 _UNITS_PER_WORKER = 4
 """Number of units for each worker in a campaign with few cases, before rounding.
 
@@ -90,7 +90,7 @@ def check_cases(kind: str, cases: Sequence[Case]) -> None:
 def cases_per_unit(cases: int, seconds_per_case: float, workers: int) -> int:
     """The number of cases in a unit of work, if a case takes `seconds_per_case` s of wall time.
 
-    `workers` is 0 while the first worker is awaited, and then counts as 1.
+    `workers`: number of workers; 0 (the first is still awaited) counts as 1.
     """
     size_by_time = int(LONGEST_UNIT_S / max(seconds_per_case, 1e-6))
     size_by_worker_count = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))

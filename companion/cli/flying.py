@@ -32,7 +32,9 @@ from companion.recording.summary_tables import flight_table, styled_text
 
 
 def with_options(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
-    """The configuration as changed by the options of the command line and the planner's name.
+    """The configuration as changed by the options of the command line.
+
+    `planner`: replaces `planner.name`; None: it stays.
 
     Raises:
         ConfigError: options and configuration contradict each other; the trajectory cannot be

@@ -37,7 +37,7 @@ SHIPPED_CONFIG = Path()
 """Value of `--bundled` without a file: the shipped configuration."""
 _MANEUVER = "identify"
 _PLANNER = "first-order"
-"""Planner for the flight: it needs no knowledge of the vehicle's response."""
+"""Planner for the flight; this one needs no knowledge of the vehicle's response."""
 _LONGEST_NAME = 200
 _FRAGMENT, _CONFIG = "vehicle.yaml", "config.yaml"
 
@@ -134,7 +134,8 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
         return EXIT_FAILURE
     _write_fit(out, text, flown_folder=None if options.log is not None else log.parent)
     kept_values = {
-        axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].flaw()}"
+        axis: f"kept from the configuration ({keys.described()}), because the fit is bad: "
+        f"{vehicle.axes[axis].flaw()}"
         for axis, keys in kept_axes(vehicle, configured_axes).items()
     }
     with suppress(OSError):

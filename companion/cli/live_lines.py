@@ -88,7 +88,7 @@ class LiveLines:
         self._lines: list[str] = []
 
     def show(self, lines: Sequence[str], *, alarm: bool = False) -> None:
-        """Replace the lines; with `alarm`, the last one shows an alarm."""
+        """Replace the lines; with `alarm`, the last line has the colour of an alarm."""
         cursor_to_first_line, columns = self._cursor_to_first_line(), self._columns()
         printable_lines = lines if self._is_unicode else [ascii_for(line) for line in lines]
         self._lines = [line[: columns - 1] for line in printable_lines]

@@ -48,8 +48,8 @@ def command_of(options: argparse.Namespace) -> Command:
 def run(command: Command, options: argparse.Namespace) -> int:
     """Run a command; return the exit code.
 
-    With `--json`, a command that an error ends before it prints its figures prints the error's
-    text as `result`, so its output can be parsed.
+    If an error ends a command with `--json` before the figures are printed, the error's text is
+    printed as `result`, so that the output can be parsed.
     """
     exit_code = EXIT_FAILURE
     reason: str | None = None

@@ -92,7 +92,7 @@ def _drop_mixed_identification(merged: Contents) -> None:
 
 
 class _IncludeReader:
-    """Reads the files that a file includes; the keys of an including file override theirs.
+    """Reads the files that a file includes; keys of an including file override the included ones.
 
     Attributes:
         merged: the keys that were read.

@@ -74,9 +74,9 @@ class GuidanceConfig(Section):
     T is the delay of the attitude behind its target plus half a guidance period, at least 0.275 s.
     The delay follows from planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s.
 
-    k is 2 up to a rate loop delay of 65 ms, 1 from 80 ms on or if the delay is unknown, and
-    interpolated in between. This delay is dead time + lag/2 + half the time to slew to
-    limits.max_tilt_rate_deg_s; that time is 0 without a slew limit.
+    k depends on a delay of the rate loop: dead time + lag/2 + half the time to slew to
+    limits.max_tilt_rate_deg_s (0 without a slew limit). k is 2 up to 65 ms, 1 from 80 ms on or if
+    the delay is unknown, and interpolated in between.
     """
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = Field(
         default=None, json_schema_extra=TUNABLE
@@ -87,8 +87,8 @@ class GuidanceConfig(Section):
     disturbance_bandwidth_rad_s: Annotated[float, Field(ge=0.5, le=30.0)] | None = Field(
         default=None, json_schema_extra=TUNABLE
     )
-    """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt. With less
-    than the smallest value, wind carries the vehicle away by metres. null: 1.5/T, T as in
+    """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt. Below the
+    permitted range, wind would carry the vehicle away by metres. null: 1.5/T, T as in
     position_weight_per_s4. With a quick rate loop the bandwidth rises up to 2.4/T while the vehicle
     moves and its measured positions have little noise."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0

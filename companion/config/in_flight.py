@@ -67,8 +67,8 @@ def changed_in_flight(
 ) -> Config:
     """The present configuration with new values.
 
-    They are checked against `start_config`, that of the flight's start. Error messages begin with
-    `name`, the source of the new values.
+    The new values are checked against `start_config`, the configuration at the start of the flight.
+    Error messages begin with `name`, the source of the new values.
 
     Raises:
         ConfigError: a key must not change in flight, or the result is not valid.

@@ -45,14 +45,16 @@ class KnownDrag(NamedTuple):
     def assumption(self) -> str:
         """The assumed drag, in parentheses, as the end of a message; empty if configured."""
         if self.drag is None:
-            return f" (the drag is not known: assumed up to {_LARGEST_DRAG.linear:g} 1/s)"
+            return (
+                f" (the vehicle's drag is not known; up to {_LARGEST_DRAG.linear:g} 1/s is assumed)"
+            )
         if self.source is not None:
             return f" (with the drag that an earlier flight learned: {self.source})"
         return ""
 
 
 def drag_before_connecting(config: Config) -> KnownDrag:
-    """The configured drag, or the one of the vehicle that flew last; unknown without either."""
+    """The configured drag; else the one learned by the vehicle that flew last; else unknown."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
     learned_file = newest_learned(config.recording.directory)
@@ -60,7 +62,7 @@ def drag_before_connecting(config: Config) -> KnownDrag:
 
 
 def drag_of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
-    """The configured drag, or the one that this vehicle learned; unknown without either.
+    """The configured drag; else the one that this vehicle learned; else unknown.
 
     Args:
         config: configuration of the flight.

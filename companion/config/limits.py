@@ -18,12 +18,12 @@ class LimitsConfig(Section):
 
     max_tilt_deg: Annotated[float, Field(ge=5.0, le=60.0, json_schema_extra=LOWERABLE)] = 35.0
     """Largest tilt of a target. The tilt of a steeper target is reduced to this limit, without a
-    change of its direction. With less than the smallest value, wind carries the vehicle away."""
+    change of its direction. Below the permitted range, wind would carry the vehicle away."""
     max_tilt_rate_deg_s: Annotated[float, Field(ge=20.0, le=1e3, json_schema_extra=LOWERABLE)] = (
         90.0
     )
-    """Largest total roll and pitch rate: √(roll² + pitch²). With less than the smallest value, a
-    hover swings by metres in a light wind."""
+    """Largest total roll and pitch rate: √(roll² + pitch²). Below the permitted range, a hover
+    would swing by metres in a light wind."""
     max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERABLE)] = (
         60.0
     )

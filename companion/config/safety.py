@@ -18,7 +18,8 @@ from companion.guidance.fence import inside
 Ending = Literal["hand_back", "land"]
 """hand_back: the autopilot holds, and the program leaves it there. land: the autopilot lands."""
 AnyAction = Literal["warn", "hold", "hand_back", "land"]
-"""warn: report the breach. hold: end the maneuver, hold in offboard, and land. Or an `Ending`."""
+"""warn: report the breach. hold: end the maneuver, hold in offboard, and land. The others: see
+`Ending`."""
 Metres = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Latitude = Annotated[float, Field(ge=-85.0, le=85.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -119,6 +120,7 @@ class SafetyConfig(Section):
                 raise ValueError("a polygon has at least three corners")
         if self.fence_polygon_m and not inside(0.0, 0.0, self.fence_polygon_m):
             raise ValueError(
-                "fence_polygon_m must surround [0, 0], where control begins; move its corners"
+                "fence_polygon_m must surround [0, 0], the point where control begins; "
+                "move its corners"
             )
         return self

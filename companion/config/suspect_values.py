@@ -13,8 +13,8 @@ _CLIMB_SPEED, _LIFT_OFF_TIME = 1.5, 4.0
 """Speed of a take-off, m/s, and time before the vehicle leaves the ground, s; by the defaults of
 the autopilot with the slower climb."""
 _DESCENT_SPEED, _LANDING_SPEED, _LANDING_HEIGHT = 1.5, 0.5, 10.0
-"""Speeds of a landing above and below this height, m/s and m; by the defaults of the autopilot with
-the slower landing."""
+"""Speeds of a landing above and below `_LANDING_HEIGHT`, m/s, and this height, m; by the defaults
+of the autopilot with the slower landing."""
 _USUAL_VALUE_BY_SUFFIX = {"_deg_s2": 1000.0, "_ms": 50.0}
 """Usual value of a key whose default is null, by the suffix of the key."""
 _MAX_SHARE_OF_USUAL = 1.0 / 20.0
@@ -77,17 +77,19 @@ def _short_times(config: Config) -> Iterator[SuspectValue]:
     height = flight.takeoff_height_m
     slow_descent = min(height, _LANDING_HEIGHT)
     fast_descent = height - slow_descent
-    for key, allowed_s, needed_s, consequence in (
+    for key, allowed_s, needed_s, maneuver, consequence in (
         (
             "flight.takeoff_timeout_s",
             flight.takeoff_timeout_s,
             _LIFT_OFF_TIME + height / _CLIMB_SPEED,
+            "climb",
             "the vehicle is landed before it has reached its height",
         ),
         (
             "flight.landing_timeout_s",
             flight.landing_timeout_s,
             slow_descent / _LANDING_SPEED + fast_descent / _DESCENT_SPEED,
+            "landing",
             "the flight ends while the vehicle still sinks",
         ),
     ):
@@ -95,9 +97,9 @@ def _short_times(config: Config) -> Iterator[SuspectValue]:
             yield SuspectValue(
                 key,
                 f"{key} is {allowed_s:g} s, and flight.takeoff_height_m {height:g} m",
-                f"at the autopilot's default speeds that takes about {needed_s:.0f} s, "
+                f"at the autopilot's default speeds the {maneuver} takes about {needed_s:.0f} s, "
                 f"so {consequence}",
-                f"raise {key} if the speeds are not higher",
+                f"raise {key}, unless the speeds are set higher in the autopilot",
             )
 
 

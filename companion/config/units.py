@@ -1,4 +1,4 @@
-"""The units of YAML keys: their names, and the only place that converts them to SI."""
+"""The units of YAML keys: their names, and their conversion to SI, which happens only here."""
 
 from collections.abc import Callable
 from math import radians

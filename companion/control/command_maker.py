@@ -31,13 +31,15 @@ class CommandMaker:
     """Flies trajectories instead of `guidance`; None: `guidance` flies them."""
 
     def guidance_input(self, now: float) -> GuidanceInput:
-        """Estimate the motion at `now` (s of event-loop time) and when a command takes effect.
+        """Estimate the motion now, and predict it for the time when a command takes effect.
+
+        `now`: event-loop time, s.
 
         Raises:
             RuntimeError: no position has come yet.
         """
         return self._estimate.guidance_input(
-            now, self.guidance.acts_after, self._learning.thrust_limits
+            now, self.guidance.effect_delay, self._learning.thrust_limits
         )
 
     def make(
@@ -55,11 +57,11 @@ class CommandMaker:
             now: event-loop time, s.
             inputs: motion of the vehicle, wind, drag and thrust limits.
             heading: present heading of the vehicle, rad.
-            frame: the frame without heading resets.
+            frame: the frame that heading resets do not turn.
             offboard_active: whether the autopilot obeys the setpoints.
         """
         # Target and heading are made from references at the same times.
-        reference_at = cache(self._flown_source.reference(now, inputs.now, heading))
+        reference_at = cache(self._flown_source.reference(now, inputs.present, heading))
         reference = reference_at(now)
         guidance_output = self.guidance.command(reference_at, now, inputs)
         if self.predictive_control is not None:

@@ -98,7 +98,10 @@ class ControlLoop:
         self._recorder.retune(limits)
 
     def on_sample(self, sample: AttitudeSample) -> None:
-        """Send a setpoint for a sample, or count why not (in lockstep: called as its step ends)."""
+        """Send a setpoint for a sample, or count why not.
+
+        In lockstep this is called when the sample's step is complete.
+        """
         if not self._recorder.on:
             self._handle_sample(sample)
             return

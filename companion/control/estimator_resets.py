@@ -38,15 +38,15 @@ _LARGEST_ACCELERATION_CHANGE = 10.0
 """Assumed largest change of the vehicle's acceleration between two positions, m/s²; a position
 change that it explains is no jump."""
 _RESET_MERGE_TIME = 0.5
-"""Time within which several jumps count as one reset, s. ODOMETRY, which counts the same reset,
-comes at 10 Hz."""
+"""Time within which several jumps count as one reset, s. ODOMETRY reports the same reset later,
+because it is sent at 10 Hz."""
 
 
 class EstimatorResets:
-    """Finds the jumps, adds them up and counts them.
+    """Finds the jumps of the autopilot's estimate, adds them up and counts them.
 
     Attributes:
-        frame: the frame without heading jumps; its `offset` is the sum of these jumps, rad.
+        frame: the frame that heading jumps do not turn; its `offset` is the sum of the jumps, rad.
         position_shift: sum of the position jumps, m NED.
         heading_corrections: sum of the estimator's gradual heading corrections, rad: heading
             changes that the body rates do not explain, without the jumps; see `StepFrame`.

@@ -25,7 +25,7 @@ _LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
 
 @dataclass(frozen=True, slots=True)
 class ExpectedResponse:
-    """Predicted response to the largest step of the maneuver `steps`, −0.3 to 0.3 for example."""
+    """Predicted response to the largest step of the maneuver `steps`, such as from −0.3 to 0.3."""
 
     coefficient: float
     """`steps.coefficient`, at which the step ends."""
@@ -60,7 +60,7 @@ class ExpectedResponse:
         possible time constant.
         """
         effects_text = ", ".join(
-            f"{time:.2f} s {'with twice' if name == _GAIN_KEY else 'without'} {name}"
+            f"{time:.2f} s {f'with {name} doubled' if name == _GAIN_KEY else f'without {name}'}"
             for name, time in sorted(
                 self.time_constants_without_cause.items(), key=lambda item: item[1]
             )

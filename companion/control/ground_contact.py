@@ -8,8 +8,8 @@ from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 _STILL_SPEED = 0.5
 """Largest estimated vertical speed of a vehicle on the ground, m/s."""
 _IMPACT_SPEED, _IMPACT_TIME = 4.0, 0.25
-"""A vehicle that sank faster than this, m/s, and is still within this time, s, hit the ground: no
-autopilot brakes its landing so hard."""
+"""A vehicle that sank faster than `_IMPACT_SPEED`, m/s, and came to rest within `_IMPACT_TIME`, s,
+hit the ground: no autopilot brakes its landing so hard."""
 _LIFT_OFF_HEIGHT = 1.0
 """Climb since the take-off command, m, above which the vehicle counts as lifted off."""
 _MAX_SPEED_AGE = 0.5

@@ -28,7 +28,7 @@ class GuidanceCommand(NamedTuple):
     """Thrust that replaces the one computed from `acceleration_down`, within the limits, 0..1;
     None: the computed thrust is sent."""
     frame: HeadingFrame = HeadingFrame()
-    """The frame without estimator resets, as it was when the command was made."""
+    """The frame that heading resets do not turn, as it was when the command was made."""
     later_target: Target | None = None
     """Target at the time `made_at` + `period`; in between, the target is interpolated linearly,
     and later it is constant. None: the target is constant from the beginning."""

@@ -31,15 +31,15 @@ class GuidanceLoop:
     On the ground the command is idle until a take-off is commanded. After that, guidance damps the
     motion until it gets a pose. `hold_here` stops and holds a pose; `follow` flies a source from
     that pose. If open-loop rates tilt the vehicle too far, the source ends, and the vehicle brakes
-    and holds. Poses and references are in the frame without resets, so no reset moves the vehicle.
+    and holds. Poses and references are in a frame that the estimator's resets do not move.
 
     Attributes:
         flown_source: the held pose and the source that is flown from it.
         gave_up: True after `give_up`: from then on no source may be flown.
-        motion: motion of the vehicle at the last step, without resets, or None.
+        motion: motion of the vehicle at the last step, in the frame of the poses, or None.
         command_not_finite: True if guidance returned NaN or infinity at the last step.
         acceleration: horizontal acceleration of the vehicle at the last step, m/s², NED.
-        tracking_error: see `FlownSource.tracking_error`; that of the last step, m.
+        tracking_error: `FlownSource.tracking_error` at the last step, m.
         estimate: estimates the motion.
         learning: learns the hover thrust.
         command_maker: makes the commands.
@@ -119,7 +119,7 @@ class GuidanceLoop:
         """Hold the pose of the present reference, after a maneuver; raises as `hold_here`."""
         now = self._clock()
         self.recorder.action(now, "hold_reference")
-        motion = self.command_maker.guidance_input(now).now
+        motion = self.command_maker.guidance_input(now).present
         reference = self.flown_source.reference(now, motion, self._heading())(now)
         self.flown_source.clear()
         self.flown_source.pose = Pose(reference.position_ned, reference.heading)
@@ -175,7 +175,7 @@ class GuidanceLoop:
         Raises:
             RuntimeError: no position has come yet.
         """
-        return self.command_maker.guidance_input(self._clock()).now
+        return self.command_maker.guidance_input(self._clock()).present
 
     def attitude(self) -> Quaternion:
         """The newest attitude, in the frame that the estimator's resets do not move."""
@@ -218,10 +218,10 @@ class GuidanceLoop:
         self.estimate.note_heading_resets(self._loop.resets.frame.offset)
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         inputs = self.command_maker.guidance_input(now)
-        self.motion, self.acceleration = inputs.now, inputs.acceleration
-        self.hold.begin_if_tilted(now, inputs.now, self._q, self._heading())
+        self.motion, self.acceleration = inputs.present, inputs.acceleration
+        self.hold.begin_if_tilted(now, inputs.present, self._q, self._heading())
         reference = self._write_command(now, inputs)
-        self.tracking_error = self.flown_source.tracking_error(now, reference, inputs.now)
+        self.tracking_error = self.flown_source.tracking_error(now, reference, inputs.present)
         if not standing:
             self.learning.step(
                 now,

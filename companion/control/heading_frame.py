@@ -9,9 +9,9 @@ from companion.attitude.rotation import clamp, down_in_body, turned_about_vertic
 from companion.guidance.reference import rotate
 
 _LARGEST_OFFSET = radians(3.0)
-"""Largest offset of the frame, rad; limits the effect of a wrong gyro."""
+"""Largest offset of a `StepFrame`, rad; limits the effect of a wrong gyro."""
 _DECAY_S = 2.0
-"""Time constant with which the offset decays after the steps, s."""
+"""Time constant with which the offset of a `StepFrame` decays after the steps, s."""
 _ATTITUDE_CONTROL_TIME_S = 1.0 / 4.5
 """Time constant with which ArduPilot's attitude controller follows its target (ATC_ANG_*_P), s."""
 

@@ -34,7 +34,7 @@ _QUICK_OBSERVER_DELAYS = 0.035, 0.06
 quick to normal, s."""
 _QUICK_OBSERVER_GAINS = 5.0, 7.0
 """Gains of the planner between which the observer changes from quick to normal, 1/s: the gain
-amplifies the noise. The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of
+amplifies the noise. The ArduPilot mock, limited to 90 °/s, never stopped oscillating with a gain of
 7.5 and a quick observer."""
 _BANDWIDTH_INCREASE = 0.6
 """`ObserverSettings.bandwidth_increase` of a quick observer."""
@@ -43,16 +43,18 @@ _IDENTIFY_BANDWIDTH = 1.0
 _POSITION_TIME_CONSTANT = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
 _POSITION_COUPLINGS = 4.0, 8.0
-"""`ObserverSettings.position_coupling` with a slow and with a quick rate loop, 1/s. Without it, the
-velocities of PX4 and ArduPilot, off by 0.05 m/s for seconds (measured), would be trusted."""
+"""`ObserverSettings.position_coupling` with a slow and with a quick rate loop, 1/s. With 0, the
+observer would trust the velocities of PX4 and ArduPilot, which are wrong by 0.05 m/s for seconds
+(measured)."""
 _TRUSTED_COUPLING_INCREASE = 5.0
 """`ObserverSettings.coupling_increase` with a quick rate loop, 1/s. With recorded errors of PX4's
 and ArduPilot's estimators the vehicle moves 5 to 25 % less than without the increase."""
 _CORRECTION_TIME_CONSTANT = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_OUTPUT_DELAY = 0.2
-"""Delay after which these corrections show in the position, s. The true positions of ArduPilot fit
-0.3 s; then figure-eights are flown best, but circles worse, because the velocity is late too."""
+"""Delay after which the estimators' corrections show in the reported position, s. The true
+positions of ArduPilot fit 0.3 s. With 0.3 s, figure-eights are flown best, but circles worse,
+because the reported velocity is late, too."""
 _CORRECTION_FILTER_TIMES = 0.1, 0.04
 """`CorrectionSettings.filter_time` with a normal and with a quick observer, s."""
 _LARGEST_CORRECTION = 0.2
@@ -85,7 +87,7 @@ def _hold_stiffness(config: Config) -> float:
     """How stiff a hold the rate loop allows, from 0 (normal) to 1 (stiff).
 
     A rate loop that slews slowly is late only in large motions. After a large motion a stiff hold
-    would oscillate without end, as on the ArduPilot mock with a rate limit of 200 °/s.
+    would never stop oscillating, as on the ArduPilot mock with a rate limit of 200 °/s.
     """
     return _falling_ramp(_rate_loop_delay(config) + slewing_delay(config), _STIFF_HOLD_DELAYS)
 

@@ -22,7 +22,7 @@ from companion.nmpc import VehicleSnapshot
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEAST_COS_TILT = 0.2
-"""Lower bound of cos(tilt) (78°), so that the slope (see `SlopeHistory`) stays bounded."""
+"""Lower bound of cos(tilt) (78°), so that the thrust's slope (see `SlopeHistory`) stays bounded."""
 _LONGEST_POSITION_GAP = 0.2
 """Longest time between two positions from which an acceleration is computed, s."""
 _DRAG_MISMATCH = 0.15
@@ -129,7 +129,7 @@ class MotionEstimate:
             RuntimeError: no position has come yet.
         """
         if self._position is None:
-            raise RuntimeError("guidance was asked to hold before any position came")
+            raise RuntimeError("guidance was asked to hold before any position had come")
         time = self.vehicle_time(now, self._position)
         measured_motion = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
         slope = self._slopes.mean(self._position.vehicle_time, time)
@@ -165,8 +165,8 @@ class MotionEstimate:
         north, east = inputs.disturbance
         return VehicleSnapshot(
             now,
-            inputs.now.position_ned,
-            inputs.now.velocity_ned,
+            inputs.present.position_ned,
+            inputs.present.velocity_ned,
             self._q,
             self._body_rates,
             (north, east, 0.0),
@@ -207,7 +207,7 @@ class MotionEstimate:
         )
 
     def _drag_mismatch(self) -> tuple[float, float, float] | None:
-        """Top speed, m/s; learned and assumed drag at it, 1/s; None: nearly equal, or uncertain."""
+        """Top speed, m/s; learned and assumed drag at top speed, 1/s; None: no sure mismatch."""
         speed = self.drag.top_speed
         learned_drag = self.drag.drag.per_velocity(speed)
         assumed_drag = self.drag.prior_drag.per_velocity(speed)
@@ -235,7 +235,7 @@ class MotionEstimate:
         )
 
     def _modelled_acceleration(self, slope: NorthEast, motion: VehicleMotion) -> NorthEast:
-        """Horizontal acceleration due to thrust and drag, m/s², without the disturbance."""
+        """Horizontal acceleration by thrust and drag, m/s² NED; `slope`: see `SlopeHistory`."""
         north, east, _ = motion.velocity_ned
         drag = self.drag.drag.deceleration(motion.velocity_ned)
         axis_drag = self._axis_drag.deceleration(north, east)

@@ -17,7 +17,7 @@ _LONGEST_PERIOD = 0.1
 
 
 class PlannerRunner:
-    """Asks the planner for body rates, with attitude and target in a frame without resets.
+    """Asks the planner for body rates; attitude and target are in a frame that resets do not turn.
 
     During open-loop steps, and for seconds after them, this frame is the `StepFrame`.
 
@@ -93,7 +93,7 @@ class PlannerRunner:
     ) -> BodyRates:
         """Ask the planner; reset it first after a gap or a restart.
 
-        The target is in the frame without resets.
+        `target` is in the frame that heading resets do not turn.
         """
         period = sample.vehicle_time - self._last_plan_time
         # Over a gap the body rates are not known, so the frame does not follow the estimator.

@@ -32,7 +32,7 @@ _DRAWINGS_PER_POINT, _DRAWINGS_PER_PATHS, _DRAWINGS_PER_BODY = 2, 5, 10
 With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows. Paths and body
 are repeated, because a viewer may join late or jump in the recording."""
 _LONGEST_PAUSE_NS = 1_000_000_000
-"""Shortest pause between two drawings after which new paths begin, ns."""
+"""Longest pause between two drawings within one path, ns; after a longer one, new paths begin."""
 _METRES_PER_M_S2 = 0.1
 """Length of a thrust arrow, m per m/s²."""
 _LEAST_COS_TILT = 0.2
@@ -65,7 +65,7 @@ _BODY_ENTITY = Entity(
 )
 
 
-class SceneRows:
+class SceneWriter:
     """Writes the channels `/scene` and `/paths`; runs in the recorder's thread."""
 
     def __init__(self) -> None:

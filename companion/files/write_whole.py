@@ -21,7 +21,7 @@ def reason_of(error: OSError) -> str:
 
 
 def file_and_reason(error: OSError) -> str:
-    """The file of the error, if it is known, and `reason_of` the error."""
+    """The file of the error, if it is known, and the error's reason (`reason_of`)."""
     return f"{'' if error.filename is None else f'{error.filename}: '}{reason_of(error)}"
 
 

@@ -26,7 +26,7 @@ class Change(NamedTuple):
     """One change of values in flight."""
 
     time: float
-    """Time when the change began, s on our clock."""
+    """Time when the change began, s of event-loop time."""
     by: str
     """Who made the change, such as "the live page"."""
     keys: tuple[Difference, ...]
@@ -36,7 +36,7 @@ class Change(NamedTuple):
         return f"changed by {self.by}: {', '.join(map(str, self.keys))}"
 
     def as_dict(self, flight_began: float) -> dict[str, Any]:
-        """The change for JSON; its time counts from `flight_began`, s on our clock."""
+        """The change for JSON; its time counts from `flight_began`, s of event-loop time."""
         keys = {each.name: [each.before, each.after] for each in self.keys}
         return {"time_s": round(self.time - flight_began, 3), "by": self.by, "keys": keys}
 

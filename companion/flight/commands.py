@@ -34,8 +34,9 @@ RequireControl = Callable[[], None]
 def roles_of(link: Link) -> frozenset[Role]:
     """The roles of the vehicle's mode, such as HOLD; empty if the mode is unknown or has no role.
 
-    A hold that a failsafe chose is not ready for a take-off or takeover: PX4 holds for
-    COM_FAIL_ACT_T before it returns or lands, and a command of ours would end the failsafe.
+    In a hold that a failsafe chose, READY is left out, so that no take-off or takeover begins: PX4
+    holds for COM_FAIL_ACT_T before it returns or lands, and a command of ours would end the
+    failsafe.
     """
     state = link.state
     roles = frozenset[Role]() if state.mode is None else link.autopilot.roles(state.mode)
@@ -143,7 +144,7 @@ async def command_if_ours(
 
 @contextmanager
 def _watching(context: FlightContext, done: IsDone) -> Iterator[Callable[[], None]]:
-    """Watch for the effect of a command, so that it is not repeated after others undid the effect.
+    """Watch a command's effect, so that the command is not repeated after others undid the effect.
 
     Yields a function to call before the first try, and later if the vehicle shows no effect. It
     raises `ModeTakenOver` if a report since its first call has shown the effect.
@@ -191,8 +192,8 @@ async def change_mode(
         if state.mode_received_at > accepted_at + _MODE_REPORT_TIMEOUT:
             if in_role(context.link, Role.OFFBOARD):
                 raise CommandUnfinished(
-                    f"{command_name(command.command)}: the autopilot accepted it, but still obeys "
-                    f"our setpoints in mode {state.mode}"
+                    f"{command_name(command.command)}: the autopilot accepted the command, but "
+                    f"still obeys our setpoints in mode {state.mode}"
                 )
             raise FlightEnded(
                 "the autopilot accepted the change of mode, but reports a mode that we did not "

@@ -26,7 +26,7 @@ _MIN_HOLDING_TILT_DEG = 5.0
 """Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
 
 _UNREPORTED_REDUCTION_DEG = 0.5
-"""Largest reduction of the tilt that is not told, °: in whole degrees it would be none."""
+"""Largest reduction of the tilt that is not reported, °: rounded to whole degrees it would be 0."""
 
 _TILT_WINDOW = 1.0
 """Window over which `_TiltMargin` takes the maximum of the allowed tilt, s."""
@@ -102,7 +102,7 @@ class _TiltMargin:
     def __init__(self, context: FlightContext) -> None:
         self._context = context
         self._reported = False
-        self._tilts_deg: deque[tuple[float, float]] = deque()  # s on our clock, °
+        self._tilts_deg: deque[tuple[float, float]] = deque()  # s of event-loop time, °
 
     def check(self) -> None:
         """Report once if the thrust allows less tilt than `limits.max_tilt_deg`.

@@ -20,7 +20,8 @@ _WINDOW_PERIODS = 4
 """Length of the window of a measurement, in periods of `_MEASURING_PERIOD`; the first window is one
 period shorter."""
 _MIN_ROW_AGE = 1.5
-"""Smallest age of the records used, s: in newer records offboard mode may already have ended."""
+"""Smallest age of the records used, s. Newer ones may come from after the end of offboard mode,
+which the autopilot has not reported yet."""
 _MAX_ROWS = 75_000
 """Largest number of records for the measurement after the flight: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
@@ -56,7 +57,7 @@ class DeadTimeWatch:
         dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
     def after_setpoint(self, now: float) -> None:
-        """Measure the dead time of the next axis, if due at `now`, s on our clock."""
+        """Measure the dead time of the next axis, if due at `now`, s of event-loop time."""
         if now < self._due_at:
             return
         self._due_at = now + _MEASURING_PERIOD

@@ -28,7 +28,7 @@ class Flight:
     """Runs the phases in order; after the first failure, runs an exit, such as hold or land.
 
     Attributes:
-        began: time when the flight began, s on our clock.
+        began: time when the flight began, s of event-loop time.
         phase, failed_phase: the running phase; the phase that failed, or None.
         end_reason: why the flight ends or ended early, or None.
         events: (time since the flight began, s; text) of each event.

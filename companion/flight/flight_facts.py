@@ -120,7 +120,7 @@ def _early_end(
 ) -> EarlyEnd | None:
     """When and where a flight ended early; None if the flight did not end early.
 
-    `takeoff_time` is in s since the flight began, `now` in s on our clock.
+    `takeoff_time` is in s since the flight began, `now` in s of event-loop time.
     """
     flight, began = assembled.flight, assembled.flight.began
     if flight.failed_phase is None or result == "ok":

@@ -29,7 +29,7 @@ _PILOT_WARNING_TIME = 10.0
 between two warnings."""
 
 _FALLING_SPEED = 2.5
-"""Downward speed above which a disarmed vehicle is falling, m/s; a landed vehicle has no speed."""
+"""Downward speed above which a disarmed vehicle is falling, m/s; a landed vehicle stands still."""
 
 _PILOT_WARNING = "Companion: vehicle does not land. Switch its mode!"
 """Text for the pilot's ground station; it fits into one STATUSTEXT."""
@@ -111,7 +111,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
 
 
 class _LandingTimeLimit:
-    """Limits the time for which the landing is commanded again, and warns the pilot."""
+    """Limits the time for which the landing command is repeated, and warns the pilot."""
 
     def __init__(self, context: FlightContext) -> None:
         self._context, self._clock = context, asyncio.get_running_loop().time

@@ -1,4 +1,4 @@
-"""Changes a disarmed vehicle from a mode in which it cannot be armed again to hold mode."""
+"""Changes a disarmed vehicle to hold mode if its present mode forbids arming."""
 
 from companion.flight.commands import ask_to_hold, require_role, roles_of
 from companion.flight.context import FlightContext
@@ -12,7 +12,7 @@ _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 async def leave_offboard(
     context: FlightContext, roles_forbidding_arming: frozenset[Role] = _OFFBOARD_ONLY
 ) -> None:
-    """Change a disarmed vehicle from offboard to hold mode, because offboard forbids arming.
+    """Change a disarmed vehicle to hold mode if its mode, such as offboard, forbids arming.
 
     When PX4 disarms, it returns to the last mode that its user chose: OFFBOARD, if the landing
     began there. PX4's pre-arm checks fail in AUTO.LAND, and in OFFBOARD without setpoints

@@ -17,7 +17,7 @@ _HOLD_TIMEOUT = 10.0
 """Time allowed to enter hold mode after the vehicle is heard again, s; then it is asked to land."""
 
 _LARGEST_DRIFT = 3.0
-"""Largest distance by which wind carries a vehicle in its climb, m; else somebody flew it away."""
+"""Largest horizontal drift by wind in a climb, m; a vehicle farther away was flown by somebody."""
 
 
 async def hold_when_heard(context: FlightContext) -> None:

@@ -38,7 +38,7 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
 
 
 def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:
-    """A copy of the sequence that has not begun: a `Follow` stores the pose where it began."""
+    """A copy that can begin anew: a `Follow` of the original may store the pose where it began."""
     return ManeuverSequence(
         [
             replace(maneuver, _turned_trajectory=None, _pose=None)
@@ -165,7 +165,7 @@ def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) ->
     north, east, down = trajectory.at(part.time).position
     reserve_text = ""
     if reserve and part.limit == TILT_LIMIT:
-        reserve_text = f" (less flight.slow_down_reserve_m_s2: {reserve:g})"
+        reserve_text = f" (minus flight.slow_down_reserve_m_s2: {reserve:g})"
     return (
         f"{part.limit or 'a limit'}{reserve_text} at {part.time:.1f} s "
         f"({north:.1f} m north, {east:.1f} m east, {0.0 - down:.1f} m up)"

@@ -82,12 +82,12 @@ class EventRecorder:
     any other exception it receives nothing more. A slow observer is reported once.
 
     Attributes:
-        phases: (begin in s on our clock, name) of each phase.
+        phases: (begin in s of event-loop time, name) of each phase.
         write, file: as the arguments.
         note: called once if the other observer fails; must record the failure as an event.
 
     Args:
-        clock: our clock, s.
+        clock: returns event-loop time, s.
         write: records a text with the present time.
         file: `flight.mcap`; None: the flight is not recorded.
     """

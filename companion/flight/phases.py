@@ -88,7 +88,7 @@ def opening_phases(config: FlightConfig) -> tuple[Phase, ...]:
 def flight_phases(
     config: FlightConfig, maneuver_duration: float, autopilot: Autopilot
 ) -> tuple[Phase, ...]:
-    """The phases after the ground phases, in the autopilot's order; `maneuver_duration` in s."""
+    """The phases after the ground phases, in order; `maneuver_duration` in s."""
     maneuvers = control_phase(
         "maneuvers", "the maneuver to end", control_phases.maneuvers, maneuver_duration
     )
@@ -99,8 +99,8 @@ def flight_phases(
 
 
 def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
-    """The phases from the ground until the autopilot obeys our rates, in the autopilot's order."""
-    stream = Phase("stream", "setpoints to flow", preflight_phases.stream, _COMMAND_TIMEOUT)
+    """The phases from the ground until the autopilot obeys our rates; PX4 gets setpoints first."""
+    stream = Phase("stream", "the first setpoints", preflight_phases.stream, _COMMAND_TIMEOUT)
     return (
         *((stream,) if autopilot.control_entry is ControlEntry.BY_COMMAND else ()),
         Phase(
@@ -147,7 +147,7 @@ def _checks(config: FlightConfig, purpose: str, work: Work, roles: frozenset[Rol
 def _takeoff(config: FlightConfig) -> Phase:
     return Phase(
         "takeoff",
-        "the height",
+        "the take-off height",
         takeoff.takeoff,
         config.takeoff_timeout_s,
         Exit.LAND,
@@ -164,7 +164,7 @@ def _takeover(on_failure: Exit, on_failure_untaken: Exit | None = None) -> Phase
     """
     return Phase(
         "offboard",
-        "the autopilot to obey our rates",
+        "the autopilot to obey our body rates",
         takeover.offboard,
         _TAKEOVER_TIMEOUT,
         on_failure,

@@ -182,7 +182,7 @@ class PreflightChecks:
             self._note_once(f"preflight warnings: {', '.join(warnings)}; see `companion doctor`")
         for finding in unsafe_findings(findings):
             if finding not in blocking:
-                self._note_once(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
+                self._note_once(f"unsafe, but accepted by flight.accept: {finding.sentence()}")
         if blocking:
             disturbed = all(finding.key in _PASSING_FINDINGS for finding in blocking)
             failure = _LinkDisturbedError if disturbed else FlightEnded

@@ -50,7 +50,7 @@ class RateRequester:
         self._last_silence = self._checked_at = -inf
 
     def check(self, now: float, health: Health) -> None:
-        """Request each message whose rate is too low at `now`, our clock, s."""
+        """Request each message whose rate is too low at `now`, s of event-loop time."""
         if (health.starved_share or 0.0) > _LARGEST_STARVED_SHARE:
             return  # this program did not run, so it did not count
         settings = self._link_config
@@ -74,7 +74,7 @@ class RateRequester:
         """Request each status that has come before, is overdue at `now`, and has a requested rate.
 
         Args:
-            now: our clock, s.
+            now: event-loop time, s.
             heartbeat_limit: age from which the mode counts as unknown, s.
         """
         state, wanted_rates = self._link.state, self._link.autopilot.wanted_rates

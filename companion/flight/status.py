@@ -72,16 +72,16 @@ class StatusReporter:
     """Records the motion in all phases, and shows the state of the flight.
 
     Attributes:
-        takeoff_time: when the vehicle left the ground, s on our clock; None before the take-off.
+        takeoff_time: when the vehicle left the ground, s of event-loop time; None: not yet.
         battery_at_takeoff: remaining charge at the take-off, 0..1; None: unknown.
         real_time: whether latencies are meaningful; False in lockstep.
 
     Args:
         ladder: tells which safety monitors have raised an alarm.
-        began: when the flight began, s on our clock.
-        current_phase: returns the running phase, and when it began, s on our clock.
+        began: when the flight began, s of event-loop time.
+        current_phase: returns the running phase, and when it began, s of event-loop time.
         show: called with the state; it must return at once. None: the state is not shown.
-        clock: our clock, s.
+        clock: returns event-loop time, s.
     """
 
     def __init__(

@@ -27,7 +27,7 @@ class StatusRows:
     """Records thrust ten times a second, and resources and link once a second.
 
     Args:
-        clock: our clock, s.
+        clock: returns event-loop time, s.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class StatusRows:
         self._processor_s = process_time()
 
     def record(self, now: float) -> None:
-        """Record what is due at `now`, s on our clock."""
+        """Record what is due at `now`, s of event-loop time."""
         recorder = self._recorder
         if recorder is None or self._fence is None:
             return
@@ -94,7 +94,7 @@ class _FenceDrawing:
         self._next_drawing_time = -inf
 
     def record(self, now: float) -> None:
-        """Record the fence if it is due at `now`, s on our clock."""
+        """Record the fence if it is due at `now`, s of event-loop time."""
         snapshots, motion = self._context.snapshot_builder, self._context.guidance_loop.motion
         height, centre = self._context.link.state.height, snapshots.fence_centre
         origin = snapshots.fence_centre_ned
@@ -113,8 +113,8 @@ class _FenceDrawing:
             self._fence.ceiling - down,
         )
         outlines = [circle_corners(self._fence.radius, _CIRCLE_SIDES)]
-        if self._fence.places and centre.place is not None:
-            outlines.append(local_polygon(self._fence.places, centre.place))
+        if self._fence.polygon_deg and centre.lat_lon is not None:
+            outlines.append(local_polygon(self._fence.polygon_deg, centre.lat_lon))
         elif self._fence.polygon:
             outlines.append(self._fence.polygon)
         points = [

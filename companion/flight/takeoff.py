@@ -24,7 +24,7 @@ _ARRIVAL_TIMEOUT = 2.0
 """Time allowed to reach altitude after the mode changed to hold, s; then the climb has failed."""
 
 _SMALLEST_RISE = 0.3
-"""A vehicle that has risen less than this has not left the ground, m: the estimate drifts."""
+"""Estimated rise up to which a vehicle counts as still on the ground, m: the estimate drifts."""
 
 _TIPPED_TILT = radians(60.0)
 """A vehicle on the ground that tilts more has tipped over, rad; the same limit as in PX4's failure
@@ -211,7 +211,7 @@ class _Climb:
             )
 
     def _jump_failure(self, height: float) -> FlightEnded | None:
-        """The end of the flight if a jump explains the wrong `height` above home (m)."""
+        """The end of the flight if `height` (m) is wrong because home or the estimate jumped."""
         climbed_height = self._climbed_height()
         if climbed_height is None:
             return None

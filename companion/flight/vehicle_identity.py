@@ -29,7 +29,7 @@ class ReplacementDetector:
     on the link, a restarted clock, another hardware id, or a long silence.
 
     Args:
-        clock: our clock, s.
+        clock: returns event-loop time, s.
 
     Attributes:
         uid: hardware id of the checked vehicle; None: unknown.

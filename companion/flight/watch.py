@@ -34,7 +34,7 @@ class Watch:
 
     Args:
         ladder: runs the safety monitors while the autopilot obeys us.
-        clock: our clock, s.
+        clock: returns event-loop time, s.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class Watch:
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _check_heartbeat(self, now: float, *, monitored: bool) -> None:
-        """Judge the age of the mode and of the heartbeat at `now`, s on our clock.
+        """Judge the age of the mode and of the heartbeat at `now`, s of event-loop time.
 
         Stalls of this program count as age only in a monitored phase while the autopilot obeys us:
         heartbeats that came during a stall are read after it, and a stall must end neither a

@@ -1,4 +1,4 @@
-"""Connects a flight to the link and to changes in flight; notes the vehicle's changes."""
+"""Connects a flight to the link and to changed values; notes changes of mode and arming state."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator

@@ -205,7 +205,7 @@ def handover_drift(wind: NorthEast) -> NorthEast:
 
 
 def brake_upwind(now: float, braking: Braking, wind: NorthEast) -> BrakingUpwind | Braking:
-    """Add a move upwind to `braking`: it begins now and is as long as the `handover_drift`.
+    """Add a move upwind to `braking`; the move begins now and covers the `handover_drift`.
 
     Args:
         now: event-loop time, s.

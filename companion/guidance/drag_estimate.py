@@ -58,7 +58,8 @@ class DragEstimate:
 
     d is the deceleration of `AxisDrag`. The state is the linear and the quadratic drag and the
     coefficient of `AxisDrag`, which are constant, and the acceleration by wind (north, east), which
-    is a random walk. Wind changes slowly, so what changes with the velocity is drag.
+    is a random walk. Wind changes slowly, so an acceleration that changes with the velocity counts
+    as drag.
 
     Attributes:
         prior_drag: drag of the prior.

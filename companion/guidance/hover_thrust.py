@@ -24,8 +24,9 @@ class ThrustSettings:
 
     Attributes:
         hover: configured normalised thrust at hover, 0..1.
-        correction_limit: limit of learning. The learned hover thrust in N is at most
-            (1 + correction_limit) times the configured one, and at least 1/(1 + correction_limit).
+        correction_limit: limit of learning. The learned hover thrust, as a share of full thrust, is
+            at most (1 + correction_limit) times the configured one, and at least 1/(1 +
+            correction_limit) of it.
         correction_time: time constant with which the learned hover thrust follows a change, s.
         min_thrust: smallest normalised thrust that is sent, 0..1.
         max_thrust: largest normalised thrust that is sent, 0..1.

@@ -179,9 +179,10 @@ class ManeuverSequence:
         if not self.parts:
             raise ValueError("the sequence has no maneuvers")
         for maneuver in self.parts[:-1]:
-            if time < maneuver.duration:
+            duration = maneuver.duration
+            if time < duration:
                 return maneuver, time
-            time -= maneuver.duration
+            time -= duration
         return self.parts[-1], time
 
     def at(self, time: float, start: Pose) -> Reference:

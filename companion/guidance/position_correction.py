@@ -59,9 +59,10 @@ class PositionCorrection:
     is estimator_time·r. If GPS is later than the filter assumes, the position also lags by
     position_delay·v.
 
-    Both belong to the same past time: the filter processes late measurements, and smooths its
-    output, so r shows the distance to GPS as it was output_delay ago. The sum is still the error of
-    the present position, which has since moved by measured accelerations.
+    The filter processes late measurements and smooths its output, so r shows the distance to GPS as
+    it was output_delay ago. The lag is therefore computed from the velocity at that time, too. The
+    sum of both is still the error of the present position, because since then the filter has moved
+    the position by measured accelerations.
 
     r is computed from two positions a short time apart, which amplifies their noise. Low-pass
     filters reduce the noise but delay the correction, so their time constant follows the noise.

@@ -49,8 +49,8 @@ class TiltCommand(NamedTuple):
 
     Attributes:
         coefficients: north and east; the sine of the tilt is their length.
-        trimmed: whether guidance adds the trim, which balances wind and the error of the estimated
-            attitude: the mean target of the latest time in `HorizontalMode.ACCELERATION`.
+        trimmed: whether guidance adds the trim (`linear.Trim`), which balances wind and the error
+            of the estimated attitude.
     """
 
     coefficients: Coefficients

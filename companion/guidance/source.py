@@ -21,7 +21,8 @@ _SHORTEST_JERK_TIME = 0.01
 class Source(Protocol):
     """Provides references to guidance: from maneuvers, another program, or a user's coroutine.
 
-    Times are event-loop times, s. Positions are m NED, in the frame without estimator resets.
+    Times are event-loop times, s. Positions are m NED, in the frame that the estimator's resets do
+    not move.
     """
 
     @property

@@ -16,7 +16,7 @@ _MIN_COSINE = 0.5
 def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
     """Specific thrust T = (g − a_D)/cos(tilt) that gives a vertical acceleration a_D, m/s².
 
-    Beyond 60° of tilt it decreases, to 0 at 90°, because upside down, thrust would push the vehicle
+    Beyond 60° of tilt the result decreases, to 0 at 90°: upside down, thrust would push the vehicle
     to the ground.
     """
     wanted = max(0.0, GRAVITY - acceleration_down)

@@ -10,14 +10,15 @@ than a lap of a circle."""
 _CORRECTION_BANDWIDTH = 2.0
 """Bandwidth of the observer that corrects the height, rad/s."""
 _LARGEST_BIAS = 0.15
-"""An observed error of the speed is clamped to ± this, m/s."""
+"""Largest magnitude of an observed error of the vertical speed, m/s; each observer clamps its
+own."""
 _ESTIMATOR_TIME = 1.2
 """Time constant with which the estimator corrects its height, s. The true heights of 54 flights fit
 1.0 s on ArduPilot and 1.5 s on PX4."""
 _LARGEST_CORRECTION = 0.1
 """Largest correction of the height, m; the largest one in recorded flights was 0.08 m."""
 _SMALLEST_JUMP = 0.15
-"""A height that differs by more than this from the prediction has jumped, m: that is no motion."""
+"""A height that differs from the prediction by more than this, m, has jumped; no motion does so."""
 _LONGEST_GAP = 0.5
 """Longest time between two positions that are compared, s."""
 
@@ -30,7 +31,7 @@ class VerticalMotion(NamedTuple):
 
 
 class VerticalCorrection:
-    """Corrects the vertical speed by the height, and the height by what its estimator does next.
+    """Corrects the vertical speed by the height, and the height by its filter's next corrections.
 
     If the accelerometer is wrong while the vehicle is tilted, the estimated vertical speed v
     differs from the change of the estimated height z: on a real PX4 by 0.02 to 0.04 m/s in circles
@@ -38,19 +39,14 @@ class VerticalCorrection:
     over seconds the speed is made to agree with the height.
 
     The autopilot's Kalman filter moves its height by its vertical speed, and towards the measured
-    height. The motion towards the measured height is the change that the speed does not explain:
-    ż − v. It is the distance to the measured height divided by the estimator's time constant. So
-    the distance is that time constant times ż − v, and is added to the height.
+    height. The motion towards the measured height is ż − v, the change that the speed does not
+    explain. This change is the distance to the measured height divided by the estimator's time
+    constant. So the distance is this time constant times ż − v. It is added to the height.
     """
 
     def __init__(self) -> None:
         self._bias = _SpeedErrorObserver(_BIAS_BANDWIDTH)
         self._correction = _SpeedErrorObserver(_CORRECTION_BANDWIDTH)
-
-    @property
-    def bias(self) -> float:
-        """Reported minus true vertical speed, m/s, positive down."""
-        return self._bias.error
 
     def corrected(self, time: float, reported: VerticalMotion) -> VerticalMotion:
         """Take a reported height and speed; return them corrected.

@@ -24,8 +24,8 @@ class FitNeeds:
     error: float = 0.003
     """Largest standard error of lag and dead time, s; see `relative_error`."""
     relative_error: float = 0.1
-    """Largest standard error of lag and dead time, as a share of lag + dead time. Of this limit and
-    `error` the larger applies."""
+    """Largest standard error of lag and dead time, as a share of lag + dead time. The larger of
+    this limit and `error` applies."""
     span: float = 0.2
     """Smallest span of the commands, rad/s."""
     excited_samples: int = 20
@@ -49,8 +49,8 @@ class RateResponse(LagFit):
         flaws = (
             (
                 isnan(self.dead_time) and fit.span == 0.0,
-                "too little excitation: no command changed while rates were measured; both need "
-                "times in s on one clock, and a command at least every 0.5 s",
+                "too little excitation: no command changed while rates were measured; commands and "
+                "rates need times in s on one clock, and commands must be at most 0.5 s apart",
             ),
             (
                 fit.span < needs.span,

@@ -11,7 +11,7 @@ from companion.identification.record import Segment, segments
 _LEAST_EXPLAINED = 0.8
 """Smallest R² of a usable map."""
 _EXCITED_SHARE = 0.2
-"""Smallest deviation of an excited command from the median command, as a share of their range."""
+"""Smallest deviation of an excited command from the median, as a share of the commands' range."""
 _ACCEPTED_HOVER = 0.05, 0.95
 """Range of the normalised thrust at hover that the configuration accepts."""
 _LARGEST_DELAY = 0.5
@@ -41,20 +41,20 @@ class ThrustMap:
         """Reason why the map must not be used; None if it may be used.
 
         Args:
-            gravity: gravity, m/s², which gives the hover thrust; this must be from 0.05 to 0.95.
+            gravity: gravity, m/s²; the map must reach it at a normalised thrust from 0.05 to 0.95.
         """
         if not self.explained >= _LEAST_EXPLAINED:
-            return f"it explains {self.explained:.0%} of the measured thrust"
+            return f"the map explains only {self.explained:.0%} of the measured thrust"
         if not self.slope > 0.0:
             return "the measured thrust falls when the commanded thrust rises"
         if not self.lag + self.dead_time < _LARGEST_DELAY:
             return (
-                f"lag plus dead time of the rotors is {self.lag + self.dead_time:.2f} s, not less "
-                f"than {_LARGEST_DELAY:.2f} s"
+                f"lag plus dead time of the rotors is {self.lag + self.dead_time:.2f} s; it must "
+                f"be less than {_LARGEST_DELAY:.2f} s"
             )
         hover = self.normalised(gravity)
         if not _ACCEPTED_HOVER[0] < hover < _ACCEPTED_HOVER[1]:
-            return f"it puts hover at a thrust of {hover:.2f}"
+            return f"by the map the vehicle hovers at a thrust of {hover:.2f}"
         return None
 
     def described(self) -> str:

@@ -13,13 +13,13 @@ Message = dict[str, Any]
 
 
 class Channel:
-    """One end of the channel. Messages that the other end does not read in time are dropped.
+    """One end of a channel. Messages that the other end does not read in time are dropped.
 
     Attributes:
         dropped: number of messages that could not be sent, because the buffer was full, the message
             too large, or the other end closed. After the other end has closed, only the first
             message is counted.
-        is_open: whether the other end existed at the last attempt.
+        is_open: whether the other end was still open when a message was last sent.
     """
 
     def __init__(self, our_socket: socket.socket) -> None:
@@ -29,7 +29,7 @@ class Channel:
 
     @staticmethod
     def pair() -> "tuple[Channel, socket.socket]":
-        """Make our end, and the socket for the other process."""
+        """Make a channel; return this process's end, and the socket for the other process."""
         our_socket, other_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         our_socket.setblocking(False)
         return Channel(our_socket), other_socket
@@ -68,7 +68,7 @@ class Channel:
             yield message if isinstance(message, dict) else {}
 
     def close(self) -> None:
-        """Close our end."""
+        """Close this process's end."""
         self.is_open = False
         self._socket.close()
 
@@ -77,7 +77,8 @@ class Feed:
     """Sends records of the flight to the helper process. Its methods may run in any thread.
 
     Attributes:
-        dropped: number of datagrams that were not sent: the buffer was full, or the process gone.
+        dropped: number of datagrams that were not sent: the buffer was full, or the process had
+            ended.
     """
 
     def __init__(self, our_socket: socket.socket) -> None:
@@ -86,7 +87,7 @@ class Feed:
 
     @staticmethod
     def pair() -> "tuple[Feed, socket.socket]":
-        """Make our end, and the socket for the other process."""
+        """Make a feed; return this process's end, and the socket for the other process."""
         our_socket, other_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         return Feed(our_socket), other_socket
 
@@ -98,7 +99,7 @@ class Feed:
             self.dropped += 1
 
     def close(self) -> None:
-        """Close our end."""
+        """Close this process's end."""
         self._socket.close()
 
 

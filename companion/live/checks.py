@@ -1,4 +1,4 @@
-"""The slow checks of a change of values; they precede the flight's own checks.
+"""The slow checks of a requested change of configuration values, before the flight's own checks.
 
 The helper process runs these checks, so that they do not delay the flight.
 """

@@ -23,7 +23,7 @@ _MOST_DATAGRAMS_PER_TURN = 20
 
 
 class _Subscriptions(ServerListener):
-    """Tracks whether somebody has the stream open. The library calls it in its own threads."""
+    """Tracks whether somebody has the stream open. Foxglove's library calls it in its threads."""
 
     def __init__(self) -> None:
         self.active: set[tuple[int, int]] = set()

@@ -45,8 +45,8 @@ class Helper:
     """An observer that passes phases, events and states on to the helper process without waiting.
 
     Attributes:
-        changes: makes the changes that the process requests. Replace it by the session's `changes`
-            before the flight begins.
+        changes: makes the changes that the process requests; the caller sets it to the session's
+            `changes` before the flight begins.
         note: called with each sentence for the user that the process sends.
         feed: sends the records for the live stream; None: no live stream.
 

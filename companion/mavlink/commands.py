@@ -41,13 +41,13 @@ _REASON_DELAY_S = 0.3  # the reason of a refusal may come as a STATUSTEXT this l
 
 
 def command_name(command: int) -> str:
-    """Name of a MAV_CMD; such as `MAV_CMD 123` if the dialect does not have it."""
+    """Name of a MAV_CMD; if the dialect lacks the command, its number, as `MAV_CMD 123`."""
     entry = dialect.enums["MAV_CMD"].get(command)
     return entry.name if entry is not None else f"MAV_CMD {command}"
 
 
 def result_name(result: int) -> str:
-    """Name of a MAV_RESULT without its prefix; such as `RESULT 42` if the dialect lacks it."""
+    """Name of a MAV_RESULT, without prefix; if the dialect lacks it, its number, as `RESULT 42`."""
     entry = dialect.enums["MAV_RESULT"].get(result)
     return entry.name.removeprefix("MAV_RESULT_") if entry is not None else f"RESULT {result}"
 

@@ -190,8 +190,8 @@ class LockstepEventLoop(LinkEventLoop):
     ) -> asyncio.TimerHandle:
         """Schedule a timer; timers due at the same time run in the order of scheduling.
 
-        In asyncio the order of such timers depends on the shape of its heap, which still depends on
-        timers that were scheduled in wall time, before the first beacon.
+        asyncio alone would run such timers in an order that also depends on timers from before the
+        first beacon, which were scheduled in wall time.
         """
         self._timer_count += 1
         order = self._timer_count % _TIMERS_IN_ORDER * _TIMER_SPACING_S

@@ -59,7 +59,7 @@ class HotSelector(selectors.DefaultSelector):
 
 
 class LinkEventLoop(asyncio.SelectorEventLoop):
-    """A selector event loop with hot readers.
+    """A selector event loop with hot readers, which `HotSelector` calls.
 
     A hot callback runs between two iterations of the loop. Like any callback it may send, set
     futures or use `call_soon`. It must not raise and must not block.

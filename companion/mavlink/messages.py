@@ -72,8 +72,8 @@ _IN_FIELD_ORDER: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
     and set(message_class.lengths) == {1}
     and "s" not in message_class.unpacker.format
 }
-"""By message id, functions that put a payload's values in the order of the constructor; only for
-messages without arrays and texts, such as most telemetry.
+"""Functions by message id. Each takes a payload's values and returns them in the order of the
+constructor's arguments. Messages with arrays or texts are left out.
 """
 
 

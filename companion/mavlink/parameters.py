@@ -1,7 +1,7 @@
 """Reads and writes parameters. Source: the MAVLink parameter protocol.
 
-PX4 sends integers bytewise: the four bytes of the float field hold the integer. Some integers look
-like a NaN, which a float may not preserve, so the field is handled as bytes here.
+PX4 sends integers bytewise: the four bytes of the float field hold the integer. The bytes
+of some integers are those of a NaN, which a float may not preserve, so this module uses the bytes.
 """
 
 import asyncio
@@ -44,7 +44,7 @@ class ParameterClient:
     """Reads and writes single parameters.
 
     Args:
-        registry: all waits for answers on the link, which end when the connection drops.
+        registry: keeps the queues of expected answers, so that a dropped connection ends each wait.
         bytewise: returns whether an integer is sent as its four bytes (PX4) instead of as a float
             (ArduPilot).
     """

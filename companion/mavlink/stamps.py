@@ -194,7 +194,7 @@ class StampChecker:
         return max(stamps, default=0)
 
     def _check_clock(self, clock_date: int, stored_date: int) -> None:
-        """Remark that the clock's date, ticks, is before the date on disk or of the release."""
+        """Add a remark if the clock's date (ticks) is before that on disk or of the release."""
         if clock_date < stored_date - _MINUTE_TICKS and stored_date > _RELEASE_DATE:
             self._remark(
                 f"this computer's clock is wrong: it says {_date_text(clock_date)}, but an earlier "

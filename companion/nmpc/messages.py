@@ -39,7 +39,7 @@ class ControlInput(NamedTuple):
     """Time of the command, on the clock of `VehicleSnapshot.time`, s."""
     north: float
     east: float
-    """`north` and `east`: coefficients of the target."""
+    """`north` and `east`: acceleration coefficients of the target."""
     heading: float
     """Heading of the target, rad."""
     thrust: float
@@ -85,7 +85,7 @@ class Answer(NamedTuple):
     """Time at which to use the answer, on the clock of `VehicleSnapshot.time`, s."""
     north: float
     east: float
-    """`north` and `east`: coefficients of the target."""
+    """`north` and `east`: acceleration coefficients of the target."""
     heading: float
     """Heading of the target, rad, in (−π, π]."""
     thrust: float

@@ -14,7 +14,7 @@ Numbers = Sequence[float]
 
 
 class Motion(NamedTuple):
-    """The motion of the vehicle: the state of the `coefficient_model`, in the same order."""
+    """The motion of the vehicle; the fields are the state of `coefficient_model`, in its order."""
 
     p_n: float
     p_e: float

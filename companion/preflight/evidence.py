@@ -57,7 +57,7 @@ class LinkQuality(NamedTuple):
     round_trip: float | None
     """Shortest recent TIMESYNC round trip, s; `None` if none was answered."""
     jitter: float | None
-    """Range of the round trips, s."""
+    """Largest minus smallest recent round trip, s; `None` if none was answered."""
     notices: tuple[str, ...] = ()
     """Messages of the link about signatures and the peer."""
     timesync_on_other_clock: bool = False

@@ -9,6 +9,7 @@ from companion.attitude.representation import is_unit
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import Message, decode, dialect
 from companion.preflight.evidence import OtherNodes, SampleTimes
+from companion.vehicle.autopilot import Role
 from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.link import Link
 from companion.vehicle.registry import AUTOPILOTS_BY_NUMBER
@@ -23,7 +24,7 @@ _SETPOINT_IDS = frozenset(
 )
 _MAX_IDLE_TARGET = 0.05
 """Largest body rate (rad/s) and thrust in ATTITUDE_TARGET of a disarmed autopilot that receives no
-setpoints (recorded: 0.02 rad/s, 0).
+setpoints in the mode in which it obeys them (recorded: 0.02 rad/s, 0).
 """
 _MIN_SAMPLES = 10
 """Smallest number of samples to measure the rate of a clock."""
@@ -69,7 +70,7 @@ class LinkListener:
 
     @property
     def samples(self) -> SampleTimes:
-        """The attitude samples so far."""
+        """Times and counts of the attitude samples received so far."""
         sample_pairs = list(pairwise(self._sample_times))
         if not sample_pairs:
             return SampleTimes(len(self._sample_times), unusable_count=self._unusable_count)
@@ -122,8 +123,14 @@ class LinkListener:
     def _on_attitude_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
         is_active = any(abs(value) > _MAX_IDLE_TARGET for value in (*rates, message.thrust))
+        state = self._link.state
+        # In its other modes the autopilot shows targets of its own: those of a PX4 that stands on a
+        # slope of 1 degree are 0.1 rad/s (measured).
+        obeys_setpoints = state.mode is not None and (
+            Role.OFFBOARD in self._link.autopilot.roles(state.mode)
+        )
         self.other_nodes.has_foreign_attitude_target |= (
-            is_active and self._link.state.armed is False
+            is_active and obeys_setpoints and state.armed is False
         )
 
     def _on_odometry(self, message: Message) -> None:

@@ -211,7 +211,7 @@ async def open_session(
 ) -> AsyncIterator[PreflightSession]:
     """Open the link. Until the session requests something, we send only heartbeats and TIMESYNC.
 
-    `make_link`: makes the link; its argument takes the link's notices.
+    `make_link`: makes the link, from a function that the link calls with each notice for the user.
 
     Raises:
         EndpointError: the endpoint cannot be opened.

@@ -105,12 +105,15 @@ class ReplayedVehicle:
         self.offset = inputs.clock_offset
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Always None, unknown: `set_inputs` has already left out every position that is stale."""
+        """Always None: the age is unknown, but `set_inputs` has left out stale positions."""
         return None
 
 
 def recorded_sample(row: Row, setpoint_row: Row | None) -> RecordedSample:
-    """The sample in a row of `SAMPLE`; `setpoint_row`: that of its `SETPOINT`; None: not sent."""
+    """The sample in a row of the channel `SAMPLE`, with its setpoint.
+
+    `setpoint_row`: row of `SETPOINT` for the same sample; None: no setpoint was sent.
+    """
     sample = AttitudeSample(
         int(row["time_boot_ms"]),
         row["vehicle_time_s"],

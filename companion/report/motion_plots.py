@@ -26,7 +26,7 @@ _NORTH, _EAST, _HEIGHT = range(3)
 _CAMERA_POSITION = {"x": 1.3, "y": -1.7, "z": 1.0}
 """Position of the camera: from the south-east and above, far enough to show the axis titles."""
 _LONGEST_EDGE = 1.2
-"""Longest edge of the box around the track, in Plotly's units: the camera sees the whole box."""
+"""Longest edge of the box around the track, in Plotly's units, so that the camera sees it all."""
 
 
 def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
@@ -167,10 +167,11 @@ def _error_plot(flights: Sequence[FlightData]) -> Plot:
 
 
 def _largest_error(flights: Sequence[FlightData]) -> float | None:
-    """The largest error in the maneuvers that have a reference throughout, m, to scale the plot.
+    """The largest tracking error that the plot must show, m; None: the plot shows all errors.
 
-    None: the plot shows all errors, because there are several flights, the flight ended early, no
-    maneuver has a reference throughout, or no error elsewhere is larger.
+    It is the largest error in the maneuvers of a single flight that have a reference from beginning
+    to end. None if there are several flights, the flight ended early, it had no such maneuver, or
+    no other error is larger.
     """
     flight = flights[0]
     if len(flights) > 1 or flight.early_end is not None or "error" not in flight.curves:

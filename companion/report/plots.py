@@ -121,9 +121,9 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
 
 
 def early_end_shapes(end: EarlyEndMark, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
-    """A line and a label at an early end, for a layout; the label is at the bottom, or `above`.
+    """A line and a label at an early end, for a layout. The reason is the tooltip of the label.
 
-    The reason is the tooltip of the label.
+    `above`: whether the label is above the plot; otherwise it is at the bottom of the plot.
     """
     line_at_end = {
         "type": "line",

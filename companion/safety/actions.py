@@ -5,10 +5,10 @@ from enum import Enum
 from companion.user_code import UserCodeError
 
 DISARMED_IN_FLIGHT = "the vehicle disarmed in flight"
-"""The words of a flight that ends because others disarmed the vehicle in the air."""
+"""Reason of the end if somebody else disarmed the vehicle in the air."""
 
 ARMED_UNKNOWN = "no heartbeat from the vehicle, so whether it is armed is not known any more"
-"""The words of a flight that ends because no heartbeat tells whether the vehicle is armed."""
+"""Reason of the end if no heartbeat tells any more whether the vehicle is armed."""
 
 
 class Action(Enum):
@@ -100,7 +100,7 @@ class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops 
 
 
 class ControlReleased(FlightEnded):
-    """The client in control commanded another mode: the usual end of a served flight."""
+    """The client in control commanded another mode: the usual end under `companion serve`."""
 
     @property
     def result(self) -> str:

@@ -87,12 +87,13 @@ def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
         return None
     return (
         f"the estimator was reset: {resets.position_shift:.1f} m and "
-        f"{degrees(resets.heading_shift):.0f}° of heading in total; the references moved as much"
+        f"{degrees(resets.heading_shift):.0f}° of heading in total; the references were moved by "
+        "the same amount"
     )
 
 
 def heading_drift(limit: float) -> BreachCheck:
-    """The estimated heading turned by more than `limit` in 20 s, rad; the vehicle did not."""
+    """The estimated heading turned by more than `limit`, rad, in 20 s; the vehicle did not turn."""
     return above(
         limit,
         lambda snapshot: snapshot.resets.heading_drift,

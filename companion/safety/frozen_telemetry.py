@@ -40,7 +40,7 @@ class _RepetitionCounter:
         return True
 
     def is_long_enough(self, duration: float) -> bool:
-        """Whether enough messages repeat the numbers, over a long enough `duration` (s)."""
+        """Whether the repetitions are enough to count as frozen, by number and `duration` (s)."""
         return self.count >= _MIN_REPETITIONS and duration >= _MIN_REPETITION_TIME
 
 

@@ -1,4 +1,4 @@
-"""Detects a heading that turns away from the vehicle's, as by a disturbed compass."""
+"""Detects an estimated heading that drifts from the true one, as by a disturbed compass."""
 
 from collections import deque
 
@@ -7,7 +7,7 @@ from companion.control.estimator_resets import EstimatorResets
 _DRIFT_WINDOW = 20.0
 """Time over which the drift is counted, s: a constant error of the gyro must not add up."""
 _SCALE_ERROR = 0.05
-"""Assumed largest scale error of a gyro. In a turn it looks like a drift of the heading."""
+"""Assumed largest scale error of a gyro. In a turn this error looks like a drift of the heading."""
 
 
 class HeadingDrift:

@@ -18,8 +18,8 @@ def silence(
     """No setpoint was sent for longer than `limit` s.
 
     `vehicle_heard`: True: the check applies only while frames come from the vehicle; False: only
-    while no frames come. `planner`, `guidance`: names of both in the
-    configuration, for the message.
+    while no frames come. `planner`, `guidance`: names of the configured planner and guidance, for
+    the message.
     """
 
     def check(snapshot: Snapshot, _: bool) -> str | None:
@@ -158,9 +158,9 @@ def rare_foreign_setpoint(snapshot: Snapshot, _: bool) -> str | None:
     )
 
 
-def frozen(snapshot: Snapshot, _: bool) -> str | None:
+def frozen_telemetry(snapshot: Snapshot, _: bool) -> str | None:
     """Attitude, position or velocity repeats one measurement under new time stamps."""
-    repeated_telemetry = snapshot.health.frozen
+    repeated_telemetry = snapshot.health.frozen_telemetry
     return None if repeated_telemetry is None else f"frozen telemetry: {repeated_telemetry}"
 
 

@@ -15,11 +15,11 @@ from companion.vehicle.autopilot import Role
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
 _MAX_HOLD_TRIES = 4
-"""Largest number of commands of hold to a vehicle that a client has landed."""
+"""Largest number of hold commands to a vehicle that a client has landed."""
 
 
 class ServedFlights:
-    """Begins the flights; the owner's control ends with its flight.
+    """Begins the flights. A program is in control (the owner) until its flight ends.
 
     Attributes:
         ownership: decides which client's requests are flown.
@@ -100,11 +100,11 @@ class ServedFlights:
         task.add_done_callback(self._unfinished_tasks.discard)
 
     def _leave_offboard(self, _: object) -> None:
-        """On a heartbeat, ask a vehicle that a client has landed to hold, unless it can be armed.
+        """On a heartbeat, command hold if a client has landed the vehicle and it cannot be armed.
 
-        PX4 returns to OFFBOARD, because this program chose that mode; see
-        `companion.flight.leave_offboard`. Each try follows a heartbeat: a pilot may have changed
-        the mode since the last one.
+        PX4 returns to OFFBOARD after disarming, because this program chose that mode, and cannot
+        be armed in it; see `companion.flight.leave_offboard`. Each try follows a heartbeat: a
+        pilot may have changed the mode since the last one.
         """
         link = self._vehicle.link
         if link.state.armed is not False or self.current_flight or self._hold_is_commanded:

@@ -80,7 +80,8 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
 def leaves_control(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame gives up its sender's control: it commands a mode, a landing or a return.
 
-    In control, ArduPilot's GUIDED is no other mode, and some programs command it again and again.
+    A command of the mode in which the autopilot obeys setpoints (OFFBOARD, GUIDED) does not count:
+    some programs repeat it while they are in control.
     """
     our_mode = autopilot.modes[autopilot.offboard_mode]
     if frame.message_id == _SET_MODE:

@@ -43,11 +43,11 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
         seed: seed of the attitudes and targets.
 
     Raises:
-        AssertionError: the planner may not fly; the message gives the initial attitude (or the
-            target that describes it), and the target that the planner should have reached.
+        AssertionError: the planner may not fly; the message gives the attitude from which the
+            planner started (as a quaternion or as a target), and the target to reach.
         PluginError: the plug-in cannot be loaded, or two packages give it.
-        TypeError: `planner` is no planner: the law does not return three numbers, or the class has
-            not the methods of a `Planner`.
+        TypeError: `planner` is no planner: the law does not return three numbers, or the class
+            lacks a method of a `Planner`.
         ValueError: there is no planner of that name.
     """
     if isinstance(planner, str) and planner in plugins.names(plugins.PLANNERS):

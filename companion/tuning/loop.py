@@ -144,7 +144,7 @@ def control_loops(config: Config, s: Complex) -> Callable[[ModelMismatch], Loop]
 
 
 def _rate_response(axis: AxisResponse, s: Complex, mismatch: ModelMismatch) -> Complex:
-    """Response (n,) of the coefficient to the commanded body rate, s."""
+    """Response (n,) of the coefficient to the commanded body rate; its unit is the second."""
     time_factor = mismatch.time_factor
     dead_time = np.exp(-s * (time_factor * axis.dead_time + mismatch.delay))
     lag = 1.0 + time_factor * s * (axis.lag + time_factor * s * axis.sigma)

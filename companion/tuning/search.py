@@ -34,8 +34,8 @@ class Aims:
     mismatch_phase_deg: float = 15.0
     """Smallest phase margin when lag and dead time differ by `mismatch_factor`, degrees."""
     rate_fraction: float = 1.0
-    """Largest fraction of the rate limit that three standard deviations of the commanded roll-pitch
-    rate may be."""
+    """Largest ratio of three standard deviations of the commanded roll-pitch rate to the limit of
+    this rate."""
 
 
 class Design(NamedTuple):
@@ -186,7 +186,7 @@ def _cost(
 
 
 def tolerated_mismatches(config: Config, aims: Aims) -> list[ModelMismatch]:
-    """Model errors that must leave a margin: wrong lag and dead time; delay by the slew limit."""
+    """Model errors with which a margin must remain: wrong lag and dead time, delay by slewing."""
     factor = aims.mismatch_factor
     mismatches = [ModelMismatch(time_factor=each) for each in (factor, 1.0 / factor)]
     delay = slewing_delay(config)

@@ -2,8 +2,7 @@
 
 The offset is vehicle time minus event-loop time. The stamp of an attitude sample minus its arrival
 is the offset minus the sample's delay. So the largest difference (`max_offset`) comes from the
-sample with the smallest delay, the "quickest" sample. TIMESYNC measures the delay of the quickest
-sample.
+sample with the smallest delay, the "quickest" sample. TIMESYNC measures the delay of that sample.
 """
 
 from collections.abc import Callable
@@ -167,7 +166,10 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _fit_stamp(self, stamp: Stamp, time_boot_ms: int, max_offset: float) -> Misfit | None:
-        """Adapt the clock (with `max_offset`, s) to a stamp; return the misfit or None."""
+        """Adapt the clock to a stamp; return why the stamp does not fit, or None.
+
+        `max_offset`: largest offset, with the drift since the last sample that fitted, s.
+        """
         if self._start_time == inf:
             self._start_time = self._last_arrival = stamp.received
             self._max_offset = 0.0 if self._lockstep else stamp.apparent_offset
@@ -190,9 +192,9 @@ class VehicleClock:
     def _link_got_quicker(self, stamp: Stamp, max_offset: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
 
-        A quicker link puts `stamp` ahead by at most the delay measured on the slower link.
-        That delay is from TIMESYNC exchanges up to the last sample that fitted the clock: before
-        later exchanges the clock may have jumped.
+        A quicker link puts `stamp` ahead by at most the delay that TIMESYNC measured before. Only
+        exchanges until the last sample that fitted the clock count, because the clock may have
+        jumped after this sample.
         """
         max_delay = self.delay.largest_possible(before=self._last_arrival - SAME_CLOCK_SPREAD)
         return stamp.time > self._newest_time and stamp.apparent_offset - max_offset <= max_delay

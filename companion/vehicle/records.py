@@ -137,7 +137,7 @@ class AttitudeTargetThrust(NamedTuple):
 
 
 class AttitudeTarget(NamedTuple):
-    """ATTITUDE_TARGET: the attitude about whose axes body rates act."""
+    """ATTITUDE_TARGET: ArduPilot's attitude setpoint; the body rates act about its axes."""
 
     time_boot_ms: int
     """The vehicle's time stamp as received, ms since its boot."""

@@ -158,7 +158,7 @@ class TimeSync:
 
     @property
     def jitter_s(self) -> float | None:
-        """Range of the recent round trips of the exchanges, s; `None` if none was answered."""
+        """Largest minus smallest recent round trip of the exchanges, s; `None`: none answered."""
         round_trips = self._recent_round_trips()
         return max(round_trips) - min(round_trips) if round_trips else None
 

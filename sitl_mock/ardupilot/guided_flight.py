@@ -36,7 +36,7 @@ class GuidedFlight:
 
     _state: State
     _parameters: ParameterTable
-    """Speeds and options."""
+    """The autopilot's parameters, with the speeds and options of GUIDED."""
     _guided: Guided
     _hold: PositionHold
     """Holds a point, a heading and a height."""

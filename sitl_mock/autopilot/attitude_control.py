@@ -6,8 +6,8 @@ from typing import NamedTuple
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 
 _OPPOSITE_MARGIN = 1e-5
-"""Two axes count as opposite (no arc between them is the shortest) if the cosine of their angle is
-less than this margin above -1."""
+"""Two axes count as opposite if the cosine of the angle between them is below -1 plus this margin.
+No arc between opposite axes is the shortest."""
 
 
 class AttitudeGains(NamedTuple):

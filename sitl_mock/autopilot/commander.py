@@ -44,7 +44,7 @@ class Commander(Protocol):
         """Enter a mode as a pilot who takes over would (fault injection)."""
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
-        """Record the heartbeat of another system or component, to notice when it is lost."""
+        """Record a heartbeat of another system or component, to notice the loss of its sender."""
 
     def receive_setpoint(self, message: Message) -> None:
         """Handle a SET_ATTITUDE_TARGET or a SET_POSITION_TARGET_LOCAL_NED."""

@@ -117,7 +117,7 @@ class FaultEffects:
     _commander: Commander
     """Refuses arming or changes the mode when a fault demands it."""
     _control: ModeControl
-    """Moves its held position and heading when the estimator resets."""
+    """Control in the present mode; an estimator reset moves its held position and heading."""
     _links: list[Link]
     """Links whose messages `NanField` faults change."""
     offboard_since_us: int | None = field(default=None, init=False)

@@ -38,7 +38,7 @@ class LandDetector:
         self._resting_since_us = 0
 
     def step(self, *, ground_contact: bool) -> None:
-        """Update from ground contact and the commanded thrust."""
+        """Update the state from ground contact and the commanded thrust."""
         state = self._state
         was_landed = state.landed
         self._update(ground_contact=ground_contact)

@@ -53,7 +53,7 @@ def setpoint_demand(
 
 
 class PositionOutput(NamedTuple):
-    """Attitude, collective thrust 0..1, and the setpoints of velocity and acceleration (NED)."""
+    """Attitude, thrust 0..1, and setpoints of velocity, m/s, and acceleration, m/s^2 (NED)."""
 
     q: Quaternion
     thrust: float

@@ -99,7 +99,7 @@ class OffboardStream:
     Attributes:
         setpoint: the setpoint; None before the first.
         setpoint_count: number of setpoints accepted so far.
-        last_setpoint_us: vehicle time at which it was received, us; None before the first.
+        last_setpoint_us: vehicle time at which the latest was received, us; None before the first.
         is_fresh: whether a setpoint arrived since the last call of `take_fresh`.
     """
 

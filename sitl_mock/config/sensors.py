@@ -20,12 +20,12 @@ class EkfConfig(Section):
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Delay with which the filter fuses a fix; the fix corrects the state this long ago. A value
-    below ``position_delay_ms`` has the effect of ``position_delay_ms``."""
+    """Time from a fix until the filter fuses it; the fix corrects the state at the time of the fix.
+    A value below ``position_delay_ms`` has the effect of ``position_delay_ms``."""
     position_late_ms: Finite = 0.0
-    """Mean delay of a fix's position beyond ``fix_delay_ms``; the filter does not correct it."""
+    """Mean delay of a fix's position beyond ``fix_delay_ms``; the filter neglects this delay."""
     velocity_late_ms: Finite = 0.0
-    """Mean delay of a fix's velocity beyond ``fix_delay_ms``; the filter does not correct it."""
+    """Mean delay of a fix's velocity beyond ``fix_delay_ms``; the filter neglects this delay."""
     fix_slip_ms: NonNegative = 0.0
     """Peak-to-peak amplitude of a sawtooth in ``position_late_ms`` and ``velocity_late_ms``. Both
     delays fall steadily, then jump back. The time of the first jump is random."""

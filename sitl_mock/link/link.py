@@ -35,7 +35,7 @@ class StreamSchedule(Protocol):
 
 @dataclass(eq=False)
 class Link:
-    """One link, without its socket: `Exchange.outgoing` takes the frames that are queued."""
+    """One link, without its socket; `Exchange.take_outgoing` takes the frames that are queued."""
 
     name: str
     """``companion`` or ``gcs``."""

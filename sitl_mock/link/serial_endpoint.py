@@ -61,7 +61,7 @@ class SerialEndpoint:
             self._stream.send(datagrams)
 
     def close(self) -> None:
-        """Close our end and remove the symbolic link."""
+        """Close the vehicle's end and remove the symbolic link."""
         os.close(self._master)
         if self._path is not None:
             self._path.unlink(missing_ok=True)

@@ -230,7 +230,7 @@ class CompiledPlant:
 
 
 def _memory_for(numbers: tuple[Any, ...]) -> Any:
-    """Return an array of bytes with room for tuples of numbers."""
+    """Return an array of bytes with room for the numbers of a tuple, which may contain tuples."""
 
     def count(value: Any) -> int:
         if isinstance(value, tuple):

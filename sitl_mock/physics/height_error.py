@@ -25,7 +25,7 @@ class HeightErrorModel:
     """Computes the slow errors of height and vertical speed.
 
     The position integrates the noise of the speed, and follows the measured height, which has its
-    own slow noise. A horizontal acceleration causes more errors of both.
+    own slow noise. A horizontal acceleration adds an error to each.
     """
 
     def __init__(self, config: EkfConfig, seed: int) -> None:

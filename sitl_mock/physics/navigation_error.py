@@ -13,8 +13,8 @@ from sitl_mock.physics.rigid_body import GRAVITY, Motion
 Errors = tuple[complex, complex, complex]
 """Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
 TruthRow = tuple[*Motion, *Vector, *Vector]
-"""The true motion after a step: 0 to 9 `Motion`, 10 to 12 position (NED, m), 13 to 15 mean
-acceleration (NED, m/s^2)."""
+"""The true motion after a step. Elements 0 to 9: `Motion`; 10 to 12: position (NED, m);
+13 to 15: mean acceleration (NED, m/s^2)."""
 TruthHistory = list[TruthRow]
 """Rows of the latest steps in a ring buffer; an array if the steps are compiled."""
 

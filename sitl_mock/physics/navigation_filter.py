@@ -76,7 +76,10 @@ class NavigationFilter:
         )
 
     def _initial_errors(self, ratio: float) -> ErrorState:
-        """Return the errors after the first fix: the configured noise of a fix times `ratio`."""
+        """Return the errors after the first fix: the noise of a fix.
+
+        `ratio`: 1 for horizontal errors, ``vertical_share`` for vertical errors.
+        """
         noise = self._draw_noise(ratio)
         return ErrorState((*noise, 0j), (0j, 0j), noise)
 
@@ -177,13 +180,13 @@ class NavigationFilter:
         return steady_error + (self.state.noiseless_yaw - steady_error) * exp(-total_rate * elapsed)
 
     def _next_noise(self, noise: tuple[complex, complex], ratio: float) -> tuple[complex, complex]:
-        """Return the noise of the next fix: the configured noise times `ratio`."""
+        """Return the noise of the next fix after `noise`; `ratio`: see `_initial_errors`."""
         decay = self._noise_decay
         position, velocity = self._draw_noise(ratio * sqrt(1.0 - decay * decay))
         return decay * noise[0] + position, decay * noise[1] + velocity
 
     def _draw_noise(self, ratio: float) -> tuple[complex, complex]:
-        """Draw white noise of position and velocity: the configured noise times `ratio`."""
+        """Draw white noise of position (m) and velocity (m/s): configured noise times `ratio`."""
         config, gauss = self._config, self._random.gauss
         sigma_p, sigma_v = ratio * config.position_noise_m, ratio * config.velocity_noise_m_s
         return (

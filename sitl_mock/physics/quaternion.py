@@ -58,8 +58,9 @@ def yaw(q: Quaternion) -> float:
 
 
 def heading_to_ned(q: Quaternion, vector: Vector) -> Vector:
-    """Return a vector (forward, right, down), level along the yaw of ``q``, in world axes (NED).
+    """Convert a vector from the axes of a level body with the yaw of ``q`` to world axes (NED).
 
+    ``vector`` is (forward, right, down).
     A NaN in one horizontal component makes both NaN; a NaN vertical component stays NaN.
     """
     w, _, _, z = from_yaw(yaw(q))

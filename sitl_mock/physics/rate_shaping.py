@@ -16,7 +16,7 @@ SqrtGains = tuple[float, float]
 
 
 class ShapingState(NamedTuple):
-    """State of the shaping."""
+    """State of the shaping of rate setpoints."""
 
     active: bool
     """Whether rates are shaped now. False on the ground, disarmed, and in a loop that does not
@@ -75,7 +75,7 @@ def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
 
 
 class ShapingConstants(NamedTuple):
-    """Constants of the shaping."""
+    """Constants of the shaping of rate setpoints."""
 
     max_change: Vector
     """Largest change of each rate in one step, rad/s."""

@@ -23,7 +23,7 @@ class ArmingChecks:
     _state: State
     """The autopilot's state; the problem found is written here."""
     _parameters: ParameterTable
-    """NAV_DLL_ACT and COM_OF_LOSS_T."""
+    """The autopilot's parameters; NAV_DLL_ACT and COM_OF_LOSS_T are used."""
     _stream: OffboardStream
     _health: HealthReport
     """Sends the failing checks as events."""

@@ -135,7 +135,7 @@ class HealthReport:
 
 
 def _components(checks: Iterable[_Check]) -> int:
-    """Return the components of checks, one bit each."""
+    """Return the bit mask of the vehicle's parts (`health_component`) to which checks belong."""
     bits = 0
     for check in checks:
         bits |= 1 << check.health_component

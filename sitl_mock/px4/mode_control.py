@@ -60,11 +60,6 @@ class Px4ModeControl:
         state.position_target.active = False
         fresh = self._stream.take_fresh()
         if not state.armed:
-            if state.mode is not Mode.OFFBOARD and state.mode not in PILOTED_MODES:
-                yaw_now = yaw(state.estimate.q)
-                state.position_target = PositionTarget(
-                    True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
-                )
             command = DISARMED_COMMAND
         elif state.mode is Mode.OFFBOARD:
             command = self._follow_offboard(dt, fresh=fresh)
@@ -82,7 +77,19 @@ class Px4ModeControl:
         state.attitude_target.rates = command[1:4]
         state.attitude_target.thrust = command.thrust
         state.command = command
+        if not state.armed and state.mode is not Mode.OFFBOARD and state.mode not in PILOTED_MODES:
+            self._show_disarmed_targets()
         return command
+
+    def _show_disarmed_targets(self) -> None:
+        """Set the targets that PX4's controllers compute while disarmed; the motors stand still."""
+        state = self._state
+        yaw_now = yaw(state.estimate.q)
+        state.position_target = PositionTarget(
+            True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
+        )
+        levelling = self._attitude_command(from_yaw(yaw_now), 0.0, 0.0)
+        state.attitude_target.rates = levelling[1:4]
 
     def _follow(self, demand: PositionDemand, dt: float) -> ActuatorCommand:
         state = self._state

@@ -106,3 +106,9 @@ def test_a_failsafe_that_a_station_makes_unsafe_in_flight_is_told(autopilot, nam
     (told,) = [text for _, text in summary.events if "set a parameter" in text]
     assert "to an unsafe value in flight" in told
     assert f"{name.decode()} is 10: when setpoints stop, the last rates are held for 10 s" in told
+
+
+def test_a_px4_that_stands_on_a_slope_shows_targets_of_its_own_and_flies():
+    with mock_vehicle(sensors={"ekf": {"tilt_bias_deg": [0.0, 1.0]}}) as mock:
+        summary = fly(mock)
+    assert summary.result == "ok", summary.events

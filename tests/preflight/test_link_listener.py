@@ -12,6 +12,7 @@ from companion.vehicle.clock import VehicleClock
 from tests.mavlink.fakes import attitude, frames_of, heartbeat, linked, until
 
 COMPANION, GROUND_STATION = 18, 6
+HOLD, OFFBOARD = 0x03040000, 0x00060000
 
 
 def of_type(kind):
@@ -24,9 +25,9 @@ def setpoint():
     )
 
 
-def target(thrust):
+def target(thrust, *, pitch_rate=0.01):
     return dialect.MAVLink_attitude_target_message(
-        0, 0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.01, 0.0, thrust
+        0, 0, (1.0, 0.0, 0.0, 0.0), 0.0, pitch_rate, 0.0, thrust
     )
 
 
@@ -57,17 +58,29 @@ async def test_who_else_is_there_and_who_steers():
         assert len(listener.other_nodes.sources) == 4  # the listener is off
 
 
-async def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
+async def test_a_disarmed_autopilot_that_obeys_setpoints_and_tells_of_thrust_is_steered():
     async with linked() as (link, vehicle):
         with LinkListener(link, asyncio.get_running_loop().time) as listener:
-            vehicle.send(target(0.0), odometry(7))
+            vehicle.send(heartbeat(OFFBOARD), target(0.0), odometry(7))
             await until(lambda: link.state.reset_counter == 7)
             assert not listener.other_nodes.has_foreign_attitude_target
-            vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
+            vehicle.send(heartbeat(OFFBOARD, armed=True), target(0.4), odometry(9))
             await until(lambda: link.state.reset_counter == 9)
             assert not listener.other_nodes.has_foreign_attitude_target
             assert listener.reset_count == 2
-            vehicle.send(heartbeat(), target(0.4), odometry(9))
+            vehicle.send(heartbeat(OFFBOARD), target(0.4), odometry(9))
+            await until(lambda: listener.other_nodes.has_foreign_attitude_target)
+
+
+async def test_a_vehicle_that_holds_on_a_slope_is_steered_by_nobody():
+    """A real PX4, disarmed in AUTO.LOITER, shows the rates that would level it."""
+    async with linked() as (link, vehicle):
+        with LinkListener(link, asyncio.get_running_loop().time) as listener:
+            vehicle.send(heartbeat(HOLD), target(0.001, pitch_rate=0.088), odometry(1))
+            await until(lambda: link.state.reset_counter == 1)
+            assert link.state.armed is False
+            assert not listener.other_nodes.has_foreign_attitude_target
+            vehicle.send(heartbeat(OFFBOARD), target(0.001, pitch_rate=0.088))
             await until(lambda: listener.other_nodes.has_foreign_attitude_target)
 
 

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 PARQUET, CSV = "results.parquet", "results.csv"
 _MOST_GRID_VALUES = 12
-"""Largest number of different values with which a sampled factor counts as a grid."""
+"""With at most this many different values, a sampled factor is judged like the values of a grid."""
 _ENOUGH_SAMPLES = 60
-"""Number of different values with which the influences of sampled factors can be distinguished."""
+"""With fewer different values, the influences of sampled factors cannot be told apart."""
 
 
 def run(options: argparse.Namespace) -> int:

@@ -73,7 +73,8 @@ def levels(column: Column) -> list[Group]:
 
     With at most `_MOST_LEVELS` different values, each value is a level. Otherwise numbers are
     divided into `_RANGE_COUNT` ranges with about equally many cases, and null is a level of its
-    own. Of texts, the first `_MOST_LEVELS` − 1 are levels, and all others form the last level.
+    own. Of texts, the first `_MOST_LEVELS` − 1 in alphabetical order are levels, and all others
+    form the last level.
     """
     distinct_keys = sorted({_sort_key(value) for value in column})
     all_fit = len(distinct_keys) <= _MOST_LEVELS
@@ -100,7 +101,7 @@ def levels(column: Column) -> list[Group]:
 
 
 def _sort_key(value: object) -> tuple[float, str]:
-    """A sort key, which puts null first, and the value as text."""
+    """A tuple that sorts values: the size (null first; 0 for a text), and the value as text."""
     if isinstance(value, bool):
         return float(value), str(value).lower()
     if isinstance(value, int | float) and isfinite(value):
@@ -147,8 +148,8 @@ def choice_groups(results: Results) -> list[Group]:
     """The cases grouped by equal values of the swept keys that a user chooses.
 
     The user chooses the keys outside `_NOT_CHOSEN_PREFIXES`. If no two cases have equal values, or
-    there are more than `_MOST_GROUPS` groups, each group is a single case. If there are many cases,
-    only every k-th is returned, so that there are fewer than 2·`_MOST_GROUPS`.
+    there are more than `_MOST_GROUPS` groups, each group is a single case. Of many cases, only some
+    at equal intervals are returned: fewer than 2·`_MOST_GROUPS`.
     """
     chosen_keys = [name for name in results.factors if not name.startswith(_NOT_CHOSEN_PREFIXES)]
     rows = range(results.count)

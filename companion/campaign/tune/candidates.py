@@ -35,7 +35,7 @@ class StartCandidate(NamedTuple):
     """A candidate with which the search starts."""
 
     name: str
-    """Source of its values, such as `companion tune`."""
+    """Source of the values, such as `companion tune`."""
     values: Values
     """Values of the searched keys. Optuna draws the value of a missing key."""
 

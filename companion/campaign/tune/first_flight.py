@@ -1,4 +1,4 @@
-"""Two flights that measure the vehicle before the search, and the candidate that follows."""
+"""Two flights that measure the vehicle before the search; their values make a start candidate."""
 
 import tempfile
 from dataclasses import replace

@@ -79,7 +79,7 @@ def _storage_errors(path: Path) -> Iterator[None]:
 
 
 class Search:
-    """A search that keeps its state in a folder; a new one first flies `learned_config`.
+    """A search that keeps its state in a folder; a new search first flies to get `learned_config`.
 
     Args:
         campaign: the campaign; gives the cases.

@@ -11,7 +11,7 @@ _LARGEST_YAW_STEP = 6.5
 """Largest change of yaw between two rows, rad: a bit more than 2π, by which a wrapped yaw jumps."""
 
 _LARGEST_FIRST_YAW = 6.5
-"""Largest magnitude of the first yaw, rad: a bit more than a turn. More is a yaw in degrees."""
+"""Largest magnitude of the first yaw, rad: a bit over a turn. A larger number is in degrees."""
 
 
 def yaw_of(data: Mapping[str, Floats], name: str) -> Floats | None:

@@ -41,8 +41,8 @@ _LONGEST_RAMP_FRACTION = 0.5
 class _Quantity(NamedTuple):
     """A derivative in a file, and the RMS by which it may differ from the spline's derivative.
 
-    This is absolute_tolerance + relative_tolerance · RMS of the derivative. The tolerance is needed
-    because published accelerations may jump, and the acceleration of a spline cannot.
+    The permitted RMS is absolute_tolerance + relative_tolerance · RMS of the derivative. It is
+    needed because published accelerations may jump, and the acceleration of a spline cannot.
 
     Attributes:
         name: name of the derivative in messages.
@@ -128,7 +128,8 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
             last too long, or the heading should follow a path that never moves horizontally; the
             table names another frame than the options, has arrays of other shapes than in `Table`,
             or a number that is not finite; an option is out of range.
-        ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see `computable`.
+        ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see
+            `reporting_numerical_errors`.
     """
     table = checked_table(table)
     _require_options(table, options)

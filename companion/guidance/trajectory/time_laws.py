@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 from companion.guidance.trajectory.sample import TrajectoryError
 
 SEPTIC_SLOPE = 2.1875
-"""Largest slope of the septic blend, 140·(1/2)⁶."""
+"""Largest slope of the septic blend 35u⁴ − 84u⁵ + 70u⁶ − 20u⁷, at u = 1/2: 140·(1/2)⁶."""
 
 
 class Progress(NamedTuple):

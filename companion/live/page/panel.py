@@ -125,7 +125,11 @@ class Panel:
 
 
 def _range_text(allowed: str) -> str:
-    """`allowed` without "changeable in flight", which holds for every key of the panel."""
+    """The allowed range of a key, for its input field.
+
+    `allowed`: text of the reference; its words "changeable in flight" are left out, because every
+    key of the panel can be changed in flight.
+    """
     return (
         allowed.replace("changeable in flight within its range", "")
         .strip(", ")

@@ -71,8 +71,9 @@ class TcpTransport:
     """A TCP client or server with at most one connection at a time.
 
     A server goes on listening when the vehicle's connection drops, so the link need not open the
-    server again. While a client is connected, a second one is refused. It replaces the first only
-    if the first has not proved to be the vehicle within 5 s, or is silent since (`PeerRule`).
+    server again. While a client is connected, a second client is refused. The second replaces the
+    first only if the first has not proved within 5 s to be the vehicle, or has become silent since
+    (`PeerRule`).
 
     Attributes:
         local: (host, port) of a listening server; `None` for a client.

@@ -91,7 +91,10 @@ Pose = tuple[float, float, float, float, float, float, float]
 
 
 class CdrMessage:
-    """Builds a CDR message. Each value is aligned to its size; offsets count after the header."""
+    """Builds a CDR message.
+
+    Each value begins at a multiple of its size, counted in bytes from the end of the header.
+    """
 
     def __init__(self) -> None:
         self._bytes = bytearray(CDR_HEADER)

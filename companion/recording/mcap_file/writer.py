@@ -55,7 +55,7 @@ class McapWriter:
         self.message(channel.topic, time_ns, channel.packing.pack(CDR_HEADER, *numbers))
 
     def stream(self) -> None:
-        """Send the messages added since the last call to the live stream, if there is one."""
+        """Pass the messages added since the last call on to the live stream, if there is one."""
         if self._batch is not None:
             self._batch.send()
 

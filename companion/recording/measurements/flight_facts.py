@@ -70,8 +70,8 @@ class FlightFacts:
     """Whether the flight ran in vehicle time (in lockstep or on a virtual clock); then latencies
     are meaningless."""
     advice: tuple[str, ...] = ()
-    """Sentences on what differs from the configuration (hover thrust, drag, dead time), and on rows
-    of the figures that were lost."""
+    """Sentences on what differs from the configuration (hover thrust, drag, dead time), and on lost
+    rows of the data from which the figures are computed."""
     gain_warning: str | None = None
     """A sentence if the planner's gain is too high, or None."""
     settings: dict[str, str] = field(default_factory=dict)

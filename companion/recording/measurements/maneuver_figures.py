@@ -113,7 +113,7 @@ def settled_maneuver_rows(rows: Floats, maneuver_changes: Sequence[ManeuverChang
 def in_maneuvers(
     vehicle_times: Floats, maneuver_changes: Sequence[ManeuverChange]
 ) -> NDArray[np.bool_]:
-    """Whether each vehicle time (N,), s, lies in a maneuver; not if it is NaN."""
+    """Whether each vehicle time (N,), s, lies in a maneuver; False for NaN."""
     change_times = np.array([change.vehicle_time for change in maneuver_changes])
     maneuver_follows = np.array([False, *(change.name is not None for change in maneuver_changes)])
     is_in_maneuver = maneuver_follows[np.searchsorted(change_times, vehicle_times, side="right")]

@@ -117,9 +117,9 @@ def first_order(steps: list[StepRun], time_constant: float) -> Floats:
 
 
 def _largest_deviation(step: StepRun) -> float:
-    """Largest distance of a step from the straight line to its target.
+    """Largest distance of the coefficients in a step from the straight line to its target.
 
-    The line begins at the attitude when the target changed; in wind this is not level.
+    The line begins at the coefficients when the target changed; in wind these are not 0.
     """
     north, east = step.direction
     cross_axis_deviation = (step.measured - step.measured[0]) @ np.array([-east, north])

@@ -99,7 +99,7 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
 
 
 def _without_slow_motion(angles: Floats, half_width: int) -> Floats:
-    """Angles (N, 2) less their moving mean over `2 half_width + 1` steps: (N − 2 half, 2)."""
+    """Angles (N, 2) less their moving mean over `2 half_width + 1` steps: (N − 2 half_width, 2)."""
     width = 2 * half_width + 1
     cumulative_sums = np.cumsum(np.vstack([np.zeros((1, 2)), angles]), axis=0)
     fast_motion: Floats = (

@@ -10,8 +10,8 @@ Figures = Mapping[str, Any]
 """Figures of a flight: the result of `Summary.as_dict`."""
 
 MAX_HORIZONTAL_RMS, MAX_HORIZONTAL_RMS_PER_SPEED = 0.15, 0.02
-"""Largest RMS of the horizontal error of a maneuver: m with the reference at rest, plus m for each
-m/s of the reference speed."""
+"""Largest RMS of the horizontal error of a maneuver: the first in m, plus the second in m for each
+m/s of the reference's speed."""
 MAX_HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
 MIN_CONSTANT_SHARE = 0.7
@@ -96,7 +96,11 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
 
 
 def _horizontal_remedy(speed: float, *, drag_was_learned: bool) -> str:
-    """The remedy at `speed`, m/s; `drag_was_learned`: by this flight, for the next one."""
+    """The remedy for a too large horizontal error in a maneuver.
+
+    `speed`: largest speed of its reference, m/s. `drag_was_learned`: whether the flight learned a
+    drag that the next flight uses.
+    """
     if drag_was_learned:
         return "fly again: the next flight begins with the drag that this flight learned"
     advice = "fly it slower" if speed > 0.0 else "fly in less wind"
@@ -122,7 +126,7 @@ def _swing(maneuver: Mapping[str, Any]) -> Iterator[Check]:
         f"swings by {rms:.1f}° RMS every {maneuver['swing_period_s']:.2g} s "
         f"(limit {MAX_SWING_RMS:g}°)"
         if is_regular
-        else f"no swing with a period (roll and pitch {rms:.1f}° RMS)",
+        else f"no periodic swing (roll and pitch {rms:.1f}° RMS)",
         rms <= MAX_SWING_RMS or not is_regular,
         "lower planner.gain_per_s or the weights guidance.position_weight_per_s4 and "
         "velocity_weight_per_s2; `companion check-config` names the largest sensible gain",

@@ -85,7 +85,7 @@ class UdpPort:
     def send(self, data: bytes, address: Any) -> bool:
         """Send a datagram; return False if the kernel's buffer is full.
 
-        After any other error the datagram is lost. True is returned: a later datagram may arrive.
+        After any other error the datagram is lost; return True, because a later one may arrive.
         """
         try:
             self._socket.sendto(data, address)

@@ -29,9 +29,9 @@ class MotionRequest(NamedTuple):
     """A commanded motion, NED, SI units and radians."""
 
     horizontal: AxisDemand
-    """Demand on (north, east)."""
+    """Demand along the axes (north, east)."""
     vertical: AxisDemand
-    """Demand on (down,)."""
+    """Demand along the axis (down,)."""
     yaw: float | None
     """Commanded yaw, rad from north; None: not commanded."""
     yaw_rate: float | None

@@ -117,7 +117,7 @@ class Comparison(NamedTuple):
 
     @property
     def worst_error(self) -> DelayMismatch:
-        """The error of lag and dead time with the largest cross-track error of model-following."""
+        """The wrong lag and dead time that give model-following its largest cross-track error."""
         errors = [error for error in self.model_following_scores if error != NO_ERROR]
         return max(errors, key=lambda error: self.model_following_scores[error].cross_track)
 
@@ -203,7 +203,7 @@ def fly_example() -> Example:
     )
 
 
-def fly_complete(tick: Tick) -> CompleteLoopFlights:
+def fly_complete_loop(tick: Tick) -> CompleteLoopFlights:
     """Fly every method at every rate, model-following also with wrong lag and dead time."""
     responses, by_rate = {}, {}
     for rate in RATES_HZ:

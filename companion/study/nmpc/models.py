@@ -213,7 +213,7 @@ def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, An
 
 
 def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
-    """(3,): coefficients north and east, cos(tilt); body z in NED is (−north, −east, cos(tilt))."""
+    """Unit vector of the thrust (3,): north, east, up; the first two are the coefficients."""
     sin_pitch_cos_roll = ca.sin(pitch) * ca.cos(roll)
     return ca.vertcat(
         -(ca.cos(yaw) * sin_pitch_cos_roll + ca.sin(yaw) * ca.sin(roll)),

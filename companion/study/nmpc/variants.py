@@ -76,7 +76,7 @@ class Variant(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A trajectory to fly; the vehicle begins at its position, level and at rest."""
+    """A trajectory to fly. The vehicle begins level, at rest, at its position at `begin`."""
 
     name: str
     """Name in tables."""
