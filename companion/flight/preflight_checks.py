@@ -154,7 +154,10 @@ class PreflightChecks:
             if finding.result is CheckResult.INEFFECTIVE and finding not in blocking
         ]
         if warnings:
-            self._note_once(f"preflight warnings: {', '.join(warnings)}; see `companion doctor`")
+            self._note_once(
+                f"preflight warnings: {', '.join(warnings)}; `companion doctor` says what to set, "
+                "docs/troubleshooting.md explains each"
+            )
         for finding in unsafe_findings(findings):
             if finding not in blocking:
                 self._note_once(f"unsafe, but excepted by flight.accept: {finding.sentence()}")

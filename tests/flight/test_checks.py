@@ -16,6 +16,6 @@ def test_what_is_unsafe_is_refused_before_arming_or_excepted_by_name():
     assert refused.result.endswith("set COM_OF_LOSS_T to 0.75")
     assert "unsafe, but excepted by flight.accept: " + refused.result in told["accepted"]
     assert (
-        "preflight warnings: COM_LOW_BAT_ACT, planner.name; see `companion doctor`"
-        in told["accepted"]
+        "preflight warnings: COM_LOW_BAT_ACT, planner.name; `companion doctor` says what to set, "
+        "docs/troubleshooting.md explains each" in told["accepted"]
     )
