@@ -264,7 +264,7 @@ def test_a_table_whose_speed_jumps_may_be_smoothed_more(tmp_path, capsys):
         ("max_tilt_deg=20", "name the section, as in `limits.max_tilt_deg`"),
         ("steepness=20", "write SECTION.KEY=VALUE"),
         ("limits.max_tilt_deg", "write SECTION.KEY=VALUE"),
-        ("limit.max_tilt_deg=20", "there is no section `limit`"),
+        ("limit.max_tilt_deg=20", "there is no section `limit`; did you mean limits?"),
         ("mock.wind.speed_m_s=5", "section `mock`, because the mock vehicle reads it from the"),
         ("limits.max_tild_deg=20", "did you mean `max_tilt_deg`?"),
         ("limits.max_tilt_deg=[", "not valid YAML"),
