@@ -80,7 +80,7 @@ def connection_url(endpoint: str) -> str:
 
 _MOST_WAITING_FRAMES = 1000
 """Largest number of frames that wait for the event loop; if more wait, the oldest are dropped."""
-_SOURCE = slice(5, 7)  # system and component of a MAVLink 2 frame
+_SOURCE_BYTES = slice(5, 7)  # system and component of a MAVLink 2 frame
 _OPEN_ERROR_TEXTS = {
     "BIND_ERROR": "the port is in use by another program, or the address is not this computer's",
     "DESTINATION_IP_UNKNOWN": "the host is unknown; use its IP address",
@@ -159,7 +159,7 @@ class MavsdkTransport:
         os.eventfd_read(self._wakeup)
         while self._waiting_frames:
             frame, received_ns = self._waiting_frames.popleft()
-            if frame[0] != V2_MAGIC or frame[_SOURCE] != self._mavsdk_source:
+            if frame[0] != V2_MAGIC or frame[_SOURCE_BYTES] != self._mavsdk_source:
                 self._has_peer = True
                 self._receive(frame, received_ns)
 

@@ -73,7 +73,9 @@ def _parser() -> argparse.ArgumentParser:
         "--control-port", type=int, help="UDP port of the JSON control channel, 0 = none"
     )
     parser.add_argument("--seed", type=int, help="seed of all noise and faults")
-    parser.add_argument("--speed", type=float, help="vehicle seconds per wall second")
+    parser.add_argument(
+        "--speed", type=float, help="seconds of vehicle time per second of real time"
+    )
     parser.add_argument(
         "--lockstep", action="store_true", help="lockstep: wait for an answer to each step"
     )

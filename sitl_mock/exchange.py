@@ -64,7 +64,7 @@ class Exchange:
         """Pass datagrams of a link to the autopilot; the companion's go through the link faults."""
         simulation = self._simulation
         faults = simulation.faults.link_faults
-        if link is self._companion_link and not self._pipe_in.is_transparent(faults):
+        if link is self._companion_link and not self._pipe_in.passes_unchanged(faults):
             arrived_bytes = [datagram for datagram, _ in datagrams]
             passed_bytes = self._pipe_in.push(arrived_bytes, faults, simulation.time_us)
             datagrams = [(datagram, decode(datagram)) for datagram in passed_bytes]
@@ -82,7 +82,7 @@ class Exchange:
         """
         frames = link.take_frames()
         faults = self._simulation.faults.link_faults
-        if link is self._companion_link and not self._pipe_out.is_transparent(faults):
+        if link is self._companion_link and not self._pipe_out.passes_unchanged(faults):
             frames = self._pipe_out.push(frames, faults, self._simulation.time_us)
         if beacon is not None:
             frames.append(link.sign(beacon))

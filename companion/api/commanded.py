@@ -24,7 +24,7 @@ def checked_copy(reference: Reference) -> Reference:
         ValueError: a number is missing or not finite.
     """
     if not isinstance(reference, Reference):
-        raise TypeError(f"a reference is a companion.Reference, not {reference!r}")
+        raise TypeError(f"a reference must be a companion.Reference, not {reference!r}")
     return reference._replace(
         position_ned=finite_vector("position_ned", reference.position_ned),
         velocity_ned=finite_vector("velocity_ned", reference.velocity_ned),
@@ -45,7 +45,9 @@ def _copied_horizontal(command: HorizontalCommand) -> HorizontalCommand:
         return BodyRates(*finite_vector("body_rates", command))
     if isinstance(command, HorizontalMode):
         return command
-    raise TypeError(f"horizontal is a HorizontalMode, TiltCommand or BodyRates, not {command!r}")
+    raise TypeError(
+        f"horizontal must be a HorizontalMode, TiltCommand or BodyRates, not {command!r}"
+    )
 
 
 def _copied_vertical(command: VerticalCommand) -> VerticalCommand:
@@ -53,4 +55,4 @@ def _copied_vertical(command: VerticalCommand) -> VerticalCommand:
         return ThrustCommand(finite_number("thrust", command.thrust))
     if isinstance(command, VerticalMode):
         return command
-    raise TypeError(f"vertical is a VerticalMode or ThrustCommand, not {command!r}")
+    raise TypeError(f"vertical must be a VerticalMode or ThrustCommand, not {command!r}")

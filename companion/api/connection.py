@@ -91,7 +91,7 @@ def as_config(config: Configuration) -> Config:
     if isinstance(config, Mapping):
         return changed(Config(), config, "the configuration")
     if not isinstance(config, Path | str):
-        raise TypeError(f"a configuration is a Config, a path or keys by section, not {config!r}")
+        raise TypeError(f"config must be a Config, a path or a dict of sections, not {config!r}")
     return load(Path(config))
 
 

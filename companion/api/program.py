@@ -103,7 +103,7 @@ class ProgramPlan:
             await self.finished.wait()
             self.require_flight()
         if self.has_requests:
-            raise RuntimeError("another call of this vehicle has not ended yet: await it first")
+            raise RuntimeError("another call on this vehicle has not ended yet: await it first")
         request = PhaseRequest(phases, ends_flight)
         self._waiting_requests.append(request)
         self._new_request.set()

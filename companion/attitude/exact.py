@@ -40,14 +40,14 @@ def exact(
     samples the response is exact at any sample rate. Beyond the recovery angle the law fades into a
     rotation towards level, as in `first-order`. A `dt` above 1 s counts as 1 s.
     """
-    gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
+    gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, law_slope = constants
     dt = dt if dt > SHORTEST_PERIOD else SHORTEST_PERIOD
     dt = dt if dt < LONGEST_PERIOD else LONGEST_PERIOD
     w, x, y, z = q
     north, east, heading, heading_rate = target
     a, b, tilt_x, tilt_y, yaw_z = split(w, x, y, z)
     cosine = 2.0 * a * a - 1.0
-    weight = 1.0 if cosine >= cos_recovery else law_weight(cosine, cos_recovery, slope)
+    weight = 1.0 if cosine >= cos_recovery else law_weight(cosine, cos_recovery, law_slope)
     roll = pitch = yaw = 0.0
     if weight > 0.0:
         remaining_north, remaining_east = north + 2.0 * a * tilt_y, east - 2.0 * a * tilt_x

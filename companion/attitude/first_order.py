@@ -25,7 +25,7 @@ def first_order(
     together, so the line stays straight. Beyond the recovery angle the law fades into a rotation
     towards level without control of the heading, which is undefined upside down.
     """
-    gain, yaw_gain, _, max_yaw_rate, _, rate_weight, speed_weight, _, cos_recovery, slope = (
+    gain, yaw_gain, _, max_yaw_rate, _, rate_weight, speed_weight, _, cos_recovery, law_slope = (
         constants
     )
     w, x, y, z = q
@@ -34,7 +34,7 @@ def first_order(
     cosine = 2.0 * a_squared - 1.0
     weight = 1.0
     if cosine < cos_recovery:
-        weight = law_weight(cosine, cos_recovery, slope)
+        weight = law_weight(cosine, cos_recovery, law_slope)
         cosine = cos_recovery
         a_squared = max(a_squared, SMALLEST_A * SMALLEST_A)
     a = sqrt(a_squared)

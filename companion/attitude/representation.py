@@ -43,7 +43,9 @@ def normalised(q: Quaternion) -> Quaternion:
         w, x, y, z = q
         norm = sqrt(w * w + x * x + y * y + z * z)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidQuaternionError(f"an attitude quaternion is four numbers: {error}") from error
+        raise InvalidQuaternionError(
+            f"an attitude quaternion must be four numbers: {error}"
+        ) from error
     if not abs(norm - 1.0) <= NORM_TOLERANCE:  # written so that NaN is refused too
         raise InvalidQuaternionError(
             f"attitude quaternion {q} has norm {norm:.6g}; expected 1 within {NORM_TOLERANCE:g}"
@@ -135,7 +137,7 @@ def limited_target(target: Target, max_norm: float) -> Target:
             -inf < norm_squared + heading < inf and abs(heading_rate) <= LARGEST_HEADING_RATE
         )
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidTargetError(f"a target is three or four numbers: {error}") from error
+        raise InvalidTargetError(f"a target must be three or four numbers: {error}") from error
     if not is_usable:
         raise InvalidTargetError(f"target is not finite, or far too large: {target}")
     if norm_squared <= max_norm * max_norm and -pi < heading <= pi:
@@ -158,5 +160,5 @@ def plausible_rates(body_rates: BodyRates | None) -> BodyRates | None:
         if abs(roll) < limit and abs(pitch) < limit and abs(yaw) < limit:
             return BodyRates(roll, pitch, yaw)
     except (TypeError, ValueError) as error:
-        raise InvalidBodyRatesError(f"body rates are three numbers: {error}") from error
+        raise InvalidBodyRatesError(f"body rates must be three numbers: {error}") from error
     return None

@@ -201,8 +201,8 @@ def _require_plain_function(law: Law) -> None:
     if not _is_plain_function(law):
         raise TypeError(
             f"the law {getattr(law, '__name__', law)!r} cannot be compiled: write it as a function "
-            "at the top of a module, without default arguments and without variables of a function "
-            "around it, or pass compiled=False"
+            "at the top of a module, without default arguments and without variables of an "
+            "enclosing function, or pass compiled=False"
         )
 
 

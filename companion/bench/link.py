@@ -44,7 +44,7 @@ _PROGRAMS = (
     _Program("echo", "blocking echo", "echo_program"),
     _Program("companion", "companion", "companion_program"),
     _Program("pymavlink", "blocking pymavlink", "pymavlink_program"),
-    _Program("companion_mavsdk", "companion by MAVSDK", "companion_program mavsdk"),
+    _Program("companion_mavsdk", "companion through MAVSDK", "companion_program mavsdk"),
     _Program("mavsdk", "MAVSDK", "mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_STAMP_MODULUS),
 )
 

@@ -199,8 +199,8 @@ def _show(figures: dict[str, Any]) -> None:
     console.print(
         f"One core simulates {simulated['seconds_per_second']:.3g} s of flight per second: "
         f"{VEHICLE_COUNT:,} vehicles at {RATE_HZ:g} Hz, first-order,"
-        f" {simulated['step_ns']:.3g} ns for each step and its rotation (by batch.advance, which"
-        " checks its arrays once; batch.rates checks them at every call).",
+        f" {simulated['step_ns']:.3g} ns for each step and its rotation. This is batch.advance,"
+        " which checks its arrays once; batch.rates checks its arrays at every call.",
         highlight=False,
     )
     if not figures["compiled"]:

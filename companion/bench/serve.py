@@ -35,7 +35,7 @@ _TELEMETRY = (
     dialect.MAVLink_servo_output_raw_message(1, 0, *[1500] * 8),
 )
 """Messages that the vehicle sends after each sample."""
-_TITLES = {"alone": "no client", "with_clients": f"{_CLIENTS} clients and a stopped one"}
+_TITLES = {"alone": "no client", "with_clients": f"{_CLIENTS} clients, and one that reads nothing"}
 
 
 def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from typing import Any
 
 from companion.config import Config
 from companion.files.yaml_file import ConfigError, validated
-from companion.testing.settings import complete_mock, mock_with
+from companion.testing.settings import mock_with_changes, mock_with_defaults
 
 _KEYS_WITHOUT_EFFECT = (
     "flight.arm",
@@ -63,7 +63,7 @@ def check_key(key: str, base: Config, place_text: str) -> None:
 def _check_mock_key(name: str, section: Mapping[str, Any], place_text: str) -> None:
     """Check that a key of the mock vehicle exists; its value is checked later, with each case."""
     *subsections, key = name.split(".")
-    complete_section: Any = complete_mock(section)
+    complete_section: Any = mock_with_defaults(section)
     for subsection in subsections:
         complete_section = (
             complete_section.get(subsection) if isinstance(complete_section, dict) else None
@@ -71,7 +71,7 @@ def _check_mock_key(name: str, section: Mapping[str, Any], place_text: str) -> N
     if isinstance(complete_section, dict) and key in complete_section:
         return
     try:
-        mock_with(section, {name: 0.0})
+        mock_with_changes(section, {name: 0.0})
     except ConfigError as error:
         if "unknown" in str(error) or "wrong section" in str(error):
             raise ConfigError(f"{place_text}: {error}") from error
@@ -95,7 +95,7 @@ def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
             sections[section] = sections[section].model_dump()
         sections[section][name] = value
     config = validated(sections, "the configuration", Config)
-    return config.model_copy(update={"mock": mock_with(base.mock or {}, mock_changes)})
+    return config.model_copy(update={"mock": mock_with_changes(base.mock or {}, mock_changes)})
 
 
 def replace_unchecked(config: Config, **sections: dict[str, Any]) -> Config:

@@ -26,7 +26,7 @@ from companion.config.files import load as load_config
 from companion.files import yaml_file
 from companion.files.yaml_file import ConfigError, nearest_place, validated
 from companion.flight.flown_config import copy_trajectory
-from companion.testing.settings import complete_mock
+from companion.testing.settings import mock_with_defaults
 
 TRAJECTORIES_FOLDER = "trajectories"
 """Folder of the copied trajectory files, in the folder of a campaign."""
@@ -155,7 +155,7 @@ class _CampaignReader:
                         "take out at_s and after_offboard_s"
                     )
             try:
-                complete_mock({"faults": scenario_section.inject})
+                mock_with_defaults({"faults": scenario_section.inject})
             except ConfigError as error:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
         self._check_names(FAULT, (NO_FAULT, *file.faults))

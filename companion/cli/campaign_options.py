@@ -72,7 +72,8 @@ def _add_rerun(sub_commands: Commands) -> None:
         "rerun",
         help="fly one case again, with a full recording and its report",
         description="Fly one case of a campaign again, record it as `companion fly` does, write "
-        "its report, and check that it is the same flight bit for bit. Exit code 1: it differs.",
+        "its report, and check that it is the same flight bit for bit. Exit code 1: the flight "
+        "differs.",
     )
     add_path(rerun, "folder", "the campaign's folder", "FOLDER")
     rerun.add_argument(

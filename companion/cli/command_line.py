@@ -158,7 +158,9 @@ def _add_identify(commands: Commands) -> None:
         "identify from a recorded flight's folder or any .tlog, without flying",
         "PATH",
     )
-    add_path(command, "--out", "result (default: vehicle.yaml beside the flight's log)")
+    add_path(
+        command, "--out", "file for the result (default: vehicle.yaml beside the flight's log)"
+    )
     add_flag(command, "--force", "replace FILE if it exists")
     _add_link_options(command)
     _add_flight_options(command)
@@ -178,12 +180,16 @@ def _add_link_options(command: argparse.ArgumentParser) -> None:
     add_flag(
         command,
         "--take-over",
-        "take over a vehicle that its pilot has flown up and switched to hold, like "
+        "take over a vehicle that its pilot has taken off and switched to hold, like "
         "flight.take_over: true",
     )
 
 
 def _add_flight_options(command: argparse.ArgumentParser) -> None:
     add_set(command, "limits.max_tilt_deg=20")
-    add_flag(command, "--lockstep", "run on the mock vehicle's clock, step by step")
+    add_flag(
+        command,
+        "--lockstep",
+        "fly in steps on the mock vehicle's clock, as fast as this computer can",
+    )
     add_json(command)

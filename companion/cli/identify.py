@@ -132,7 +132,8 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
         return EXIT_FAILURE
     _write_fit(out, text, flown_folder=None if options.log is not None else log.parent)
     kept_values = {
-        axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].flaw()}"
+        axis: f"kept from the configuration ({keys.described()}), because the fit is bad: "
+        f"{vehicle.axes[axis].flaw()}"
         for axis, keys in kept_axes(vehicle, configured_axes).items()
     }
     with suppress(OSError):

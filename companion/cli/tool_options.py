@@ -69,7 +69,7 @@ def add_tune(commands: Commands) -> None:
         dest="output",
         type=Path,
         metavar="FILE",
-        help="result (default: tuned.yaml beside the vehicle file)",
+        help="file for the result (default: tuned.yaml beside the vehicle file)",
     )
     add_flag(tune, "--force", "replace FILE if it exists")
     add_flag(tune, "--no-flights", "do not fly the values on the mock vehicle")
@@ -129,7 +129,9 @@ def add_study(commands: Commands) -> None:
     study.add_argument(
         "name", choices=registry.study_names(), metavar="NAME", help="a study, see below"
     )
-    case_help = f"the step that {registry.names_with_case()} flies (configs/study-case.yaml)"
+    case_help = (
+        f"for {registry.names_with_case()}: file with the step to fly (configs/study-case.yaml)"
+    )
     add_path(study, "--case", case_help)
     out_help = "folder for the results (default: study)"
     add_path(study, "--out", out_help, "DIR", default=Path("study"))

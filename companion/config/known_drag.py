@@ -45,7 +45,9 @@ class KnownDrag(NamedTuple):
     def assumption(self) -> str:
         """The assumed drag, in parentheses, as the end of a message; empty if configured."""
         if self.drag is None:
-            return f" (the drag is not known: assumed up to {_LARGEST_DRAG.linear:g} 1/s)"
+            return (
+                f" (the vehicle's drag is not known; up to {_LARGEST_DRAG.linear:g} 1/s is assumed)"
+            )
         if self.source is not None:
             return f" (with the drag that an earlier flight learned: {self.source})"
         return ""

@@ -120,6 +120,7 @@ class SafetyConfig(Section):
                 raise ValueError(f"{key} must have at least three corners, or none")
         if self.fence_polygon_m and not inside(0.0, 0.0, self.fence_polygon_m):
             raise ValueError(
-                "fence_polygon_m must surround [0, 0], where control begins; move its corners"
+                "fence_polygon_m must surround [0, 0], the point where control begins; "
+                "move its corners"
             )
         return self

@@ -77,17 +77,19 @@ def _short_times(config: Config) -> Iterator[SuspectValue]:
     height = flight.takeoff_height_m
     slow_descent = min(height, _LANDING_HEIGHT)
     fast_descent = height - slow_descent
-    for key, allowed_s, needed_s, consequence in (
+    for key, allowed_s, needed_s, maneuver, consequence in (
         (
             "flight.takeoff_timeout_s",
             flight.takeoff_timeout_s,
             _LIFT_OFF_TIME + height / _CLIMB_SPEED,
+            "climb",
             "the vehicle is landed before it has reached its height",
         ),
         (
             "flight.landing_timeout_s",
             flight.landing_timeout_s,
             slow_descent / _LANDING_SPEED + fast_descent / _DESCENT_SPEED,
+            "landing",
             "the flight ends while the vehicle still sinks",
         ),
     ):
@@ -95,9 +97,9 @@ def _short_times(config: Config) -> Iterator[SuspectValue]:
             yield SuspectValue(
                 key,
                 f"{key} is {allowed_s:g} s, and flight.takeoff_height_m {height:g} m",
-                f"at the autopilot's default speeds that takes about {needed_s:.0f} s, "
+                f"at the autopilot's default speeds the {maneuver} takes about {needed_s:.0f} s, "
                 f"so {consequence}",
-                f"raise {key} if the speeds are not higher",
+                f"raise {key}, unless the speeds are set higher in the autopilot",
             )
 
 

@@ -26,9 +26,9 @@ from companion.guidance.trajectory import (
     Table,
     Trajectory,
     TrajectoryError,
-    computable,
     from_samples,
     read_csv,
+    reporting_numerical_errors,
 )
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.spline_curve import SplineCurve
@@ -126,8 +126,8 @@ def _table_notes(
     axes_note = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
         axes_note += (
-            ", because it names no frame; to name one, write `# frame: ned` in its first line, or "
-            "csv.frame in a YAML file that names it"
+            ", because it names no frame; to name one, write `# frame: ned` in the table's first "
+            "line, or set csv.frame in the YAML file that names the table"
         )
     notes = [axes_note]
     if table.unused_columns:
@@ -235,7 +235,7 @@ def read(path: Path) -> LoadedTrajectory:
             impossible trajectory.
     """
     try:
-        with computable():
+        with reporting_numerical_errors():
             loaded_trajectory = (
                 CsvShape(file=Path(path.name)).read(path.parent)
                 if is_table(path)

@@ -39,7 +39,7 @@ class CommandMaker:
             RuntimeError: no position has come yet.
         """
         return self._estimate.guidance_input(
-            now, self.guidance.acts_after, self._learning.thrust_limits
+            now, self.guidance.effect_delay, self._learning.thrust_limits
         )
 
     def make(
@@ -61,7 +61,7 @@ class CommandMaker:
             offboard_active: whether the autopilot obeys the setpoints.
         """
         # Target and heading are made from references at the same times.
-        reference_at = cache(self._flown_source.reference(now, inputs.now, heading))
+        reference_at = cache(self._flown_source.reference(now, inputs.present, heading))
         reference = reference_at(now)
         guidance_output = self.guidance.command(reference_at, now, inputs)
         if self.predictive_control is not None:

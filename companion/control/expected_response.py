@@ -60,7 +60,7 @@ class ExpectedResponse:
         possible time constant.
         """
         effects_text = ", ".join(
-            f"{time:.2f} s {'with twice' if name == _GAIN_KEY else 'without'} {name}"
+            f"{time:.2f} s {f'with {name} doubled' if name == _GAIN_KEY else f'without {name}'}"
             for name, time in sorted(
                 self.time_constants_without_cause.items(), key=lambda item: item[1]
             )

@@ -119,7 +119,7 @@ class GuidanceLoop:
         """Hold the pose of the present reference, after a maneuver; raises as `hold_here`."""
         now = self._clock()
         self.recorder.action(now, "hold_reference")
-        motion = self.command_maker.guidance_input(now).now
+        motion = self.command_maker.guidance_input(now).present
         reference = self.flown_source.reference(now, motion, self._heading())(now)
         self.flown_source.clear()
         self.flown_source.pose = Pose(reference.position_ned, reference.heading)
@@ -175,7 +175,7 @@ class GuidanceLoop:
         Raises:
             RuntimeError: no position has come yet.
         """
-        return self.command_maker.guidance_input(self._clock()).now
+        return self.command_maker.guidance_input(self._clock()).present
 
     def attitude(self) -> Quaternion:
         """The newest attitude, in the frame that the estimator's resets do not move."""
@@ -218,10 +218,10 @@ class GuidanceLoop:
         self.estimate.note_heading_resets(self._loop.resets.frame.offset)
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         inputs = self.command_maker.guidance_input(now)
-        self.motion, self.acceleration = inputs.now, inputs.acceleration
-        self.hold.begin_if_tilted(now, inputs.now, self._q, self._heading())
+        self.motion, self.acceleration = inputs.present, inputs.acceleration
+        self.hold.begin_if_tilted(now, inputs.present, self._q, self._heading())
         reference = self._write_command(now, inputs)
-        self.tracking_error = self.flown_source.tracking_error(now, reference, inputs.now)
+        self.tracking_error = self.flown_source.tracking_error(now, reference, inputs.present)
         if not standing:
             self.learning.step(
                 now,

@@ -47,7 +47,7 @@ class Hold:
         if self._flown_source.remaining_braking_time(now) > 0.0:
             return  # a new braking would stop the vehicle further away
         inputs = self._command_maker.guidance_input(now)
-        motion, (north, east, _) = inputs.now, inputs.now.velocity_ned
+        motion, (north, east, _) = inputs.present, inputs.present.velocity_ned
         acceleration_by_tilt = GRAVITY * tan(self._largest_tilt())
         acceleration = acceleration_beside_wind(
             acceleration_by_tilt, (north, east), inputs.disturbance
@@ -77,7 +77,7 @@ class Hold:
         limit = f"limits.max_tilt_deg = {degrees(largest_tilt):.0f}"
         if largest_tilt < self.max_tilt:
             limit = (
-                f"the {degrees(largest_tilt):.0f}° up to which limits.max_thrust holds the height"
+                f"the {degrees(largest_tilt):.0f}° at which limits.max_thrust just holds the height"
             )
         self.give_up_reason = (
             f"{name} was ended, because the vehicle tilts by {degrees(tilt):.0f}°, more than "

@@ -129,7 +129,7 @@ class MotionEstimate:
             RuntimeError: no position has come yet.
         """
         if self._position is None:
-            raise RuntimeError("guidance was asked to hold before any position came")
+            raise RuntimeError("guidance was asked to hold before any position had come")
         time = self.vehicle_time(now, self._position)
         measured_motion = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
         slope = self._slopes.mean(self._position.vehicle_time, time)
@@ -165,8 +165,8 @@ class MotionEstimate:
         north, east = inputs.disturbance
         return VehicleSnapshot(
             now,
-            inputs.now.position_ned,
-            inputs.now.velocity_ned,
+            inputs.present.position_ned,
+            inputs.present.velocity_ned,
             self._q,
             self._body_rates,
             (north, east, 0.0),

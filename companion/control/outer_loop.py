@@ -75,7 +75,7 @@ def _require_command(kind: str, guidance: Guidance, thrust_limits: tuple[float, 
     try:
         command = guidance.command(lambda _: Reference(motion_at_rest.position_ned), 0.0, inputs)
         target, later_target, acceleration_down = command
-        numbers = (guidance.acts_after, *target, *later_target, acceleration_down)
+        numbers = (guidance.effect_delay, *target, *later_target, acceleration_down)
         is_finite = all(map(isfinite, numbers))
     except (Exception, SystemExit) as error:
         raise ConfigError(
@@ -85,7 +85,7 @@ def _require_command(kind: str, guidance: Guidance, thrust_limits: tuple[float, 
     if not is_finite:
         raise ConfigError(
             f"guidance.kind: {kind} cannot be flown: for a vehicle at rest its command and "
-            f"`acts_after` must be finite, but they are {command} and {guidance.acts_after} s"
+            f"`effect_delay` must be finite, but they are {command} and {guidance.effect_delay} s"
         )
 
 

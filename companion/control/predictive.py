@@ -93,7 +93,7 @@ class PredictiveControl:
 
         `frame`: the frame that heading resets do not turn.
         """
-        target, acceleration_down = linear_command.target, linear_command.down
+        target, acceleration_down = linear_command.target, linear_command.acceleration_down
         target = target._replace(heading=frame.estimated_heading(target.heading))
         answer = None if followed_trajectory is None else self._answer(vehicle.time)
         if answer is not None:
@@ -147,7 +147,7 @@ class PredictiveControl:
     def _report(self, trouble: Trouble, message: str) -> None:
         self.record.troubles[trouble] += 1
         if self.record.troubles[trouble] == 1:
-            self._note(f"predictive control: {message}; linear guidance flies on")
+            self._note(f"predictive control: {message}; linear guidance continues the flight")
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:

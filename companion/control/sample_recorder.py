@@ -11,7 +11,7 @@ from companion.attitude import BodyRates, Limits
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import UnansweredReason
 from companion.control.planner_runner import PlannerRunner
-from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
+from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleWriter
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
@@ -52,7 +52,7 @@ class SampleRecorder:
 
     def retune(self, limits: Limits) -> None:
         """Use other limits of the body rates from the next sample on."""
-        self._rows = SampleRows(limits, self._thrust_limits)
+        self._writer = SampleWriter(limits, self._thrust_limits)
 
     def begin(self) -> None:
         """Begin a new sample, which is not yet checked or answered."""
@@ -109,7 +109,7 @@ class SampleRecorder:
         if self._recorder is None:
             return
         entry = SampleEntry(sample, reason, flags, self.checked_at, self._answer)
-        self._recorder.add(sample.received, self._rows.sample, entry)
+        self._recorder.add(sample.received, self._writer.sample, entry)
 
     def action(self, name: str) -> None:
         """Record that a phase of the flight called the method `name` of the control loop."""
@@ -118,4 +118,4 @@ class SampleRecorder:
 
     def _record_attitude_target(self, target: AttitudeTarget) -> None:
         if self._recorder is not None:
-            self._recorder.add(self._clock(), self._rows.attitude_target, target)
+            self._recorder.add(self._clock(), self._writer.attitude_target, target)

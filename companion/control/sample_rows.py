@@ -78,7 +78,7 @@ class SampleEntry(NamedTuple):
     """Setpoint that was sent, or None."""
 
 
-class SampleRows:
+class SampleWriter:
     """Writes the numeric channels of the control loop.
 
     Args:

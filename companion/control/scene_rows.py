@@ -65,7 +65,7 @@ _BODY_ENTITY = Entity(
 )
 
 
-class SceneRows:
+class SceneWriter:
     """Writes the channels `/scene` and `/paths`; runs in the recorder's thread."""
 
     def __init__(self) -> None:

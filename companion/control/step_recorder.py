@@ -9,7 +9,7 @@ from math import nan
 
 from companion.control.flown_source import FlownSource
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepRows
+from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepWriter
 from companion.control.telemetry import GuidedVehicle
 from companion.recording.trace import FlightTrace
 
@@ -29,7 +29,7 @@ class StepRecorder:
         self._flown_source = flown_source
         self._recorded_maneuver: object = None
         self._vehicle = vehicle
-        self._rows = StepRows()
+        self._writer = StepWriter()
 
     def step(
         self,
@@ -61,7 +61,7 @@ class StepRecorder:
             state.armed,
             flags,
         )
-        self._recorder.add(now, self._rows.step, StepEntry(inputs, output, command))
+        self._recorder.add(now, self._writer.step, StepEntry(inputs, output, command))
 
     def action(self, now: float, name: str) -> None:
         """Record that a flight phase called `name` of the guidance loop at `now`, s (loop time)."""
@@ -84,5 +84,5 @@ class StepRecorder:
             north = east = nan  # only the height is a reference
         if not reference.holds_height:
             down = nan
-        estimated_position = output.inputs.now.position_ned
+        estimated_position = output.inputs.present.position_ned
         self._trace.tracking.add([output.vehicle_time, north, east, down, *estimated_position])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from companion.attitude import Quaternion, Target
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.scene_rows import SceneRows
+from companion.control.scene_rows import SceneWriter
 from companion.guidance import GuidanceInput, Reference
 from companion.guidance.reference import Vector
 from companion.recording.mcap_file import cdr
@@ -79,11 +79,11 @@ class StepEntry(NamedTuple):
     """The command for the control loop; None: no new command."""
 
 
-class StepRows:
+class StepWriter:
     """Writes the channels of guidance, and the vehicle as 3D viewers draw it (ENU)."""
 
     def __init__(self) -> None:
-        self._scene = SceneRows()
+        self._scene = SceneWriter()
         self._count = 0
 
     def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
@@ -100,12 +100,12 @@ class StepRows:
             if self._count % _STEPS_PER_POSE == 0:
                 self._draw(writer, time_ns, output)
             if self._count % _STEPS_PER_DRAWING == 0:
-                position = _east_north_up(output.inputs.now.position_ned)
+                position = _east_north_up(output.inputs.present.position_ned)
                 reference = _east_north_up(output.reference.position_ned)
                 self._scene.draw(writer, time_ns, output.q, position, reference)
 
     def _draw(self, writer: McapWriter, time_ns: int, output: StepOutput) -> None:
-        pose = (*_east_north_up(output.inputs.now.position_ned), *_enu_from_flu(output.q))
+        pose = (*_east_north_up(output.inputs.present.position_ned), *_enu_from_flu(output.q))
         writer.message("/tf", time_ns, cdr.pose_message(time_ns, pose, "world", "vehicle"))
         writer.message("/pose", time_ns, cdr.pose_message(time_ns, pose, "world"))
         # Drawn with the attitude of the vehicle, because a reference has none.
@@ -160,8 +160,8 @@ def _guidance_row(output: StepOutput) -> tuple[float, ...]:
         *reference.position_ned,
         *reference.velocity_ned,
         reference.heading,
-        *inputs.now.position_ned,
-        *inputs.now.velocity_ned,
+        *inputs.present.position_ned,
+        *inputs.present.velocity_ned,
         _nan_if_none(output.tracking_error),
         *inputs.disturbance,
         *inputs.drag,

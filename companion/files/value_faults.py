@@ -23,7 +23,7 @@ _MISTAKEN_UNITS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("_m_s", "km/h", lambda value: value / 3.6),
     ("_per_s", "%", lambda value: 0.01 * value),
     ("_s", "ms", lambda value: 0.001 * value),
-    ("_percent", "parts of 1", lambda value: 100.0 * value),
+    ("_percent", "0..1", lambda value: 100.0 * value),
     ("", "%", lambda value: 0.01 * value),
 )
 """Suffix of a key, the unit often mistaken for the key's unit, and the conversion from the mistaken

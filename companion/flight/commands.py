@@ -205,8 +205,8 @@ async def change_mode(
         if state.mode_received_at > accepted_at + _MODE_REPORT_TIMEOUT:
             if in_role(context.link, Role.OFFBOARD):
                 raise CommandUnfinished(
-                    f"{command_name(command.command)}: the autopilot accepted it, but still obeys "
-                    f"our setpoints in mode {state.mode}"
+                    f"{command_name(command.command)}: the autopilot accepted the command, but "
+                    f"still obeys our setpoints in mode {state.mode}"
                 )
             raise FlightEnded(
                 "the autopilot accepted the change of mode, but reports a mode that we did not "

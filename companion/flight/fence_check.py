@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from companion.guidance.fence import Breach, Fence, Place
+from companion.guidance.fence import Breach, Fence, LatLon
 from companion.guidance.reference import Vector
 from companion.guidance.trajectory.demand import Motion, columns
 from companion.guidance.trajectory.feasibility import Violation
@@ -33,7 +33,7 @@ class FenceCheck:
     """The fence that the monitors watch in flight."""
     height: float
     """Height above home where control begins, m."""
-    origin: Place | None = None
+    origin: LatLon | None = None
     """Geographic position where control begins, or None; then a fence in latitude and longitude is
     not checked."""
 
@@ -80,7 +80,7 @@ class FenceCheck:
             int(stopping_points[:, 2].argmin()),
             int(stopping_points[:, 2].argmax()),
         }
-        if self.fence.polygon or (self.fence.places and self.origin):
+        if self.fence.polygon or (self.fence.polygon_deg and self.origin):
             step_lengths = np.hypot(*np.diff(stopping_points[:, :2], axis=0).T)
             path_sections = np.floor(
                 np.concatenate(([0.0], np.cumsum(step_lengths))) / _POINT_DISTANCE
@@ -91,8 +91,8 @@ class FenceCheck:
     def _breach(self, motion: Motion, k: int) -> Breach | None:
         offset, velocity = _vector(motion.position[k]), _vector(motion.velocity[k])
         fence = self.fence
-        if fence.places and self.origin is None:
-            fence = replace(fence, places=())
+        if fence.polygon_deg and self.origin is None:
+            fence = replace(fence, polygon_deg=())
         north, east, _ = _vector(motion.acceleration[k])
         height = self.height - offset[2]
         return fence.breach_at_stopping_point(
@@ -110,13 +110,13 @@ class FenceCheck:
 
 def _breach_text(breach: Breach, time: float, slowing_helps: bool) -> str:
     if breach.distance_outside > 0.0:
-        what_happens = "braking would end" if slowing_helps else "it goes"
+        what_happens = "braking would end" if slowing_helps else "the vehicle goes"
         what_happens = f"{what_happens} up to {breach.distance_outside:.1f} m outside the fence"
     else:
         what_happens = (
-            "it would stop too near to the fence"
+            "the vehicle would stop too near to the fence"
             if slowing_helps
-            else "it comes too near to the fence"
+            else "the vehicle comes too near to the fence"
         )
     return (
         f"from {time:.2f} s on {what_happens} ({breach.where}; {breach.limit} with a margin of "
@@ -126,10 +126,8 @@ def _breach_text(breach: Breach, time: float, slowing_helps: bool) -> str:
 
 def _remedy(slowing_helps: bool) -> str:
     if slowing_helps:
-        return (
-            "fly it more slowly (--slow-down finds how much for a trajectory), or widen the fence"
-        )
-    return "shrink it or widen the fence"
+        return "fly more slowly (for a trajectory, --slow-down finds how much), or widen the fence"
+    return "make the path smaller, or widen the fence"
 
 
 def _vector(row: Floats) -> Vector:

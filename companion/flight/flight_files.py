@@ -68,7 +68,7 @@ class FlightFiles:
             self._reserved_space = ReservedSpace(folder, _SUMMARY_RESERVE)
             loop = asyncio.get_running_loop()
             in_vehicle_time = config.link.lockstep or not environment.realtime
-            epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
+            clock_epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
 
             def on_failure(text: str) -> None:  # called in a writing thread
                 loop.call_soon_threadsafe(self._report_failure, text)
@@ -76,10 +76,10 @@ class FlightFiles:
             def on_bad_entry(text: str) -> None:  # called in a writing thread too
                 loop.call_soon_threadsafe(note, text)
 
-            self.tap = TlogWriter(folder / TLOG_FILE, epoch, on_failure)
+            self.tap = TlogWriter(folder / TLOG_FILE, clock_epoch, on_failure)
             self.mcap = FlightRecorder(
                 folder / "flight.mcap",
-                epoch,
+                clock_epoch,
                 loop.time,
                 on_failure,
                 on_bad_entry,

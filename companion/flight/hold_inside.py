@@ -2,7 +2,7 @@
 
 from companion.flight.context import FlightContext
 from companion.guidance.braking import handover_drift
-from companion.guidance.fence import Fence, Place
+from companion.guidance.fence import Fence, LatLon
 from companion.guidance.reference import NorthEast, Vector, minus
 from companion.safety.table import fence_of
 
@@ -24,12 +24,12 @@ def brake_inside_fence(context: FlightContext) -> None:
         return
     stopping_point = minus(pose.position_ned, centre.position_ned)
     wind = guidance.estimate.disturbance
-    if only_upwind_is_inside(fence_of(context.config), centre.place, stopping_point, wind):
+    if only_upwind_is_inside(fence_of(context.config), centre.lat_lon, stopping_point, wind):
         guidance.move_upwind()
 
 
 def only_upwind_is_inside(
-    fence: Fence, origin: Place | None, stopping_point: Vector, wind: NorthEast
+    fence: Fence, origin: LatLon | None, stopping_point: Vector, wind: NorthEast
 ) -> bool:
     """Whether the landing would drift out of the fence, but not if it began further upwind.
 

@@ -16,7 +16,7 @@ from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck
 from companion.guidance import GRAVITY, Doublets, Maneuver, ManeuverSequence
-from companion.guidance.fence import Place
+from companion.guidance.fence import LatLon
 from companion.guidance.follow import Follow, HeldHeadingManeuver
 from companion.guidance.predicted import predict
 from companion.guidance.reference import Vector
@@ -55,7 +55,7 @@ def require_flyable(config: Config, maneuver: Maneuver, drag: KnownDrag) -> None
 
 
 def require_inside(
-    config: Config, maneuvers: Iterable[Maneuver], origin: Place | None, drag: KnownDrag
+    config: Config, maneuvers: Iterable[Maneuver], origin: LatLon | None, drag: KnownDrag
 ) -> None:
     """Check that all maneuvers stay inside the fence, also a fence in latitude and longitude.
 
@@ -145,7 +145,7 @@ def naming_trajectory_errors(name: str | Path) -> Iterator[None]:
 
 
 def _require_motions_inside(
-    config: Config, maneuver: Maneuver, motions: Iterable[Motion], origin: Place | None
+    config: Config, maneuver: Maneuver, motions: Iterable[Motion], origin: LatLon | None
 ) -> None:
     """Check predicted motions of a maneuver; see `require_inside`."""
     check = _fence_check(config, origin)
@@ -224,5 +224,5 @@ def with_reserve(config: Config, envelope: Envelope) -> Envelope:
     return replace(envelope, max_tilt=atan(max_acceleration / GRAVITY))
 
 
-def _fence_check(config: Config, origin: Place | None) -> FenceCheck:
+def _fence_check(config: Config, origin: LatLon | None) -> FenceCheck:
     return FenceCheck(fence_of(config), config.flight.takeoff_height_m, origin)

@@ -184,7 +184,7 @@ def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) ->
     north, east, down = trajectory.at(part.time).position
     reserve_text = ""
     if reserve and part.limit == TILT_LIMIT:
-        reserve_text = f" (less flight.slow_down_reserve_m_s2: {reserve:g})"
+        reserve_text = f" (minus flight.slow_down_reserve_m_s2: {reserve:g})"
     return (
         f"{part.limit or 'a limit'}{reserve_text} at {part.time:.1f} s "
         f"({north:z.1f} m north, {east:z.1f} m east, {-down:z.1f} m up)"

@@ -100,7 +100,7 @@ def flight_phases(
 
 def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
     """The phases from the ground until the autopilot obeys our rates; PX4 gets setpoints first."""
-    stream = Phase("stream", "setpoints to flow", preflight_phases.stream, _COMMAND_TIMEOUT)
+    stream = Phase("stream", "the first setpoints", preflight_phases.stream, _COMMAND_TIMEOUT)
     return (
         *((stream,) if autopilot.control_entry is ControlEntry.BY_COMMAND else ()),
         Phase(
@@ -147,7 +147,7 @@ def _checks(config: FlightConfig, purpose: str, work: Work, roles: frozenset[Rol
 def _takeoff(config: FlightConfig) -> Phase:
     return Phase(
         "takeoff",
-        "the height",
+        "the take-off height",
         takeoff.takeoff,
         config.takeoff_timeout_s,
         Exit.LAND,
@@ -160,7 +160,7 @@ def _takeover(on_failure: Exit) -> Phase:
     """The phase of the takeover; after a failure, `on_failure` lands or holds the vehicle."""
     return Phase(
         "offboard",
-        "the autopilot to obey our rates",
+        "the autopilot to obey our body rates",
         takeover.offboard,
         _TAKEOVER_TIMEOUT,
         on_failure,

@@ -164,7 +164,7 @@ class PreflightChecks:
             )
         for finding in unsafe_findings(findings):
             if finding not in blocking:
-                self._note_once(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
+                self._note_once(f"unsafe, but accepted by flight.accept: {finding.sentence()}")
         if blocking:
             raise FlightEnded("; and ".join(finding.sentence() for finding in blocking))
 

@@ -11,7 +11,7 @@ from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.leave_offboard import leave_offboard
 from companion.flight.maneuver_checks import require_inside, require_still_flyable
-from companion.guidance.fence import Place
+from companion.guidance.fence import LatLon
 from companion.mavlink.commands import ARM, DISARM
 from companion.preflight import vehicle_checks
 from companion.preflight.evidence import Evidence, Stage
@@ -83,7 +83,9 @@ async def stream(context: FlightContext) -> None:
     """Start to send setpoints, on the ground with zero thrust; wait until enough were sent."""
     context.loop.on = True
     setpoint_goal = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
-    await context.until(lambda: context.loop.record.setpoints >= setpoint_goal, "setpoints to flow")
+    await context.until(
+        lambda: context.loop.record.setpoints >= setpoint_goal, "the first setpoints"
+    )
 
 
 async def arm(context: FlightContext) -> None:
@@ -198,7 +200,7 @@ def _require_flyable_by_vehicle(context: FlightContext) -> None:
         if drag != drag_before_connecting(config):
             require_still_flyable(config, maneuvers, drag)
         if config.safety.fence_polygon_deg and global_position is not None:
-            position = Place(global_position.latitude_deg, global_position.longitude_deg)
+            position = LatLon(global_position.latitude_deg, global_position.longitude_deg)
             require_inside(config, maneuvers.parts, position, drag)
     except ConfigError as error:
         raise FlightEnded(str(error)) from error

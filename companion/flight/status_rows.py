@@ -113,8 +113,8 @@ class _FenceDrawing:
             self._fence.ceiling - down,
         )
         outlines = [circle_corners(self._fence.radius, _CIRCLE_SIDES)]
-        if self._fence.places and centre.place is not None:
-            outlines.append(local_polygon(self._fence.places, centre.place))
+        if self._fence.polygon_deg and centre.lat_lon is not None:
+            outlines.append(local_polygon(self._fence.polygon_deg, centre.lat_lon))
         elif self._fence.polygon:
             outlines.append(self._fence.polygon)
         points = [

@@ -205,7 +205,7 @@ async def _take_over(context: FlightContext) -> None:
     autopilot = context.link.autopilot
     if autopilot.control_entry is ControlEntry.BY_COMMAND and not context.loop.on:
         await stream(context)
-    context.waiting_for = "the autopilot to obey our rates"
+    context.waiting_for = "the autopilot to obey our body rates"
     context.loop.taking_over = True
 
     def require_control() -> None:

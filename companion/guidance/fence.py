@@ -19,7 +19,7 @@ EARTH_RADIUS = 6_371_000.0
 """Mean radius of the earth, m; over the size of a fence the earth counts as flat."""
 
 
-class Place(NamedTuple):
+class LatLon(NamedTuple):
     """Latitude and longitude of a place (WGS84), degrees."""
 
     latitude: float
@@ -31,11 +31,11 @@ class FenceCentre(NamedTuple):
 
     Attributes:
         position_ned: position in the autopilot's local frame, m NED.
-        place: latitude and longitude; None: unknown.
+        lat_lon: latitude and longitude; None: unknown.
     """
 
     position_ned: Vector
-    place: Place | None
+    lat_lon: LatLon | None
 
 
 class Breach(NamedTuple):
@@ -72,7 +72,7 @@ class Fence:
         ceiling: largest height above the place where control began, m.
         floor: smallest height above home, m.
         polygon: corners, m north and east of where control began; empty: only the cylinder.
-        places: corners as (latitude, longitude) in degrees, instead of `polygon`.
+        polygon_deg: corners as (latitude, longitude) in degrees, instead of `polygon`.
         deceleration: deceleration that the vehicle reaches if its tilt allows it, m/s².
         reaction_time: assumed delay before the vehicle brakes, s.
         estimate_delay: delay of the estimated horizontal motion behind the true one, s.
@@ -84,7 +84,7 @@ class Fence:
     ceiling: float
     floor: float
     polygon: tuple[Corner, ...]
-    places: tuple[Corner, ...]
+    polygon_deg: tuple[Corner, ...]
     deceleration: float
     reaction_time: float
     estimate_delay: float = 0.0
@@ -98,10 +98,10 @@ class Fence:
     @property
     def levels(self) -> "Fence":
         """The fence with only ceiling and floor."""
-        return replace(self, radius=inf, polygon=(), places=())
+        return replace(self, radius=inf, polygon=(), polygon_deg=())
 
     def breach(
-        self, offset: Vector, height: float | None, origin: Place | None, margin: float = 0.0
+        self, offset: Vector, height: float | None, origin: LatLon | None, margin: float = 0.0
     ) -> Breach | None:
         """The first limit of the fence that a place breaches; None: it breaches none.
 
@@ -109,8 +109,8 @@ class Fence:
             offset: position of the place relative to where control began, m NED.
             height: height of the place above home, m; None: home is not known, and the floor is not
                 checked.
-            origin: the place where control began; None: it is not known. A fence with `places` is
-                then breached everywhere.
+            origin: the place where control began; None: it is not known. A fence with `polygon_deg`
+                is then breached everywhere.
             margin: how far inside the fence the place must lie, m.
         """
         north, east, down = offset
@@ -118,14 +118,15 @@ class Fence:
         if distance > self.radius - margin:
             where = f"{distance:.1f} m from where control began"
             return Breach("limits.fence_radius_m", "beyond", where, distance - self.radius)
-        if self.places and origin is None:
+        if self.polygon_deg and origin is None:
             where = "at a place whose latitude and longitude are not known"
             return Breach("safety.fence_polygon_deg", "but needed by", where, 0.0)
-        corners = local_polygon(self.places, origin) if origin and self.places else self.polygon
+        polygon_deg = self.polygon_deg
+        corners = local_polygon(polygon_deg, origin) if origin and polygon_deg else self.polygon
         if corners:
             distance_outside = -distance_inside(north, east, corners) if margin else 0.0
             if distance_outside > -margin or not inside(north, east, corners):
-                key = "safety.fence_polygon_deg" if self.places else "safety.fence_polygon_m"
+                key = "safety.fence_polygon_deg" if polygon_deg else "safety.fence_polygon_m"
                 where = f"{north:.1f} m north and {east:.1f} m east of where control began"
                 return Breach(key, "outside", where, distance_outside)
         if -down > self.ceiling - margin:
@@ -188,7 +189,7 @@ class Fence:
         offset: Vector,
         velocity: Vector,
         height: float | None,
-        origin: Place | None,
+        origin: LatLon | None,
         margin: float = 0.0,
         acceleration: NorthEast = (0.0, 0.0),
         wind: NorthEast | None = None,
@@ -234,16 +235,16 @@ def circle_corners(radius: float, count: int) -> tuple[Corner, ...]:
     return tuple((radius * cos(angle), radius * sin(angle)) for angle in angles)
 
 
-def local_polygon(places: tuple[Corner, ...], origin: Place) -> tuple[Corner, ...]:
+def local_polygon(corners_deg: tuple[Corner, ...], origin: LatLon) -> tuple[Corner, ...]:
     """Convert corners from (latitude, longitude) in degrees to m north and east of `origin`."""
-    return tuple(local_offset(Place(*corner), origin) for corner in places)
+    return tuple(local_offset(LatLon(*corner), origin) for corner in corners_deg)
 
 
-def local_offset(place: Place, origin: Place) -> Corner:
+def local_offset(lat_lon: LatLon, origin: LatLon) -> Corner:
     """How far a place lies from `origin`, m north and east, the short way across ±180°."""
     return (
-        EARTH_RADIUS * radians(place.latitude - origin.latitude),
+        EARTH_RADIUS * radians(lat_lon.latitude - origin.latitude),
         EARTH_RADIUS
-        * radians(remainder(place.longitude - origin.longitude, 360.0))
+        * radians(remainder(lat_lon.longitude - origin.longitude, 360.0))
         * cos(radians(origin.latitude)),
     )

@@ -50,7 +50,7 @@ class GuidanceInput(NamedTuple):
     """Input of one guidance step.
 
     Attributes:
-        now: present motion.
+        present: present motion.
         predicted: motion predicted for the time when the present command takes effect.
         thrust: horizontal acceleration by the present thrust, m/s², NED.
         disturbance: horizontal acceleration by wind and bias, m/s², NED.
@@ -59,7 +59,7 @@ class GuidanceInput(NamedTuple):
         axis_drag: how the drag along the body's axes differs from `drag`.
     """
 
-    now: VehicleMotion
+    present: VehicleMotion
     predicted: VehicleMotion
     thrust: NorthEast
     disturbance: NorthEast
@@ -70,7 +70,7 @@ class GuidanceInput(NamedTuple):
     @property
     def acceleration(self) -> NorthEast:
         """Present horizontal acceleration by thrust, wind and drag, m/s², NED."""
-        north, east = self.deceleration(self.now.velocity_ned)
+        north, east = self.deceleration(self.present.velocity_ned)
         return (
             self.thrust[0] + self.disturbance[0] - north,
             self.thrust[1] + self.disturbance[1] - east,
@@ -88,20 +88,21 @@ class LinearCommand(NamedTuple):
 
     Attributes:
         target: the planner's target now.
-        later: the target one period later; between the two the target moves on a straight line.
-        down: wanted vertical acceleration by thrust and gravity, m/s², positive down.
+        later_target: the target one period later; between the two the target moves on a straight
+            line.
+        acceleration_down: wanted vertical acceleration by thrust and gravity, m/s², positive down.
     """
 
     target: Target
-    later: Target
-    down: float
+    later_target: Target
+    acceleration_down: float
 
 
 class Guidance(Protocol):
     """Turns a reference into a target and a vertical acceleration, once in each period."""
 
     @property
-    def acts_after(self) -> float:
+    def effect_delay(self) -> float:
         """Mean delay from computing a command until its feedback takes effect, s.
 
         `GuidanceInput.predicted` is the motion after this delay.
@@ -162,7 +163,7 @@ class LinearGuidance:
         self._settings = settings
 
     @property
-    def acts_after(self) -> float:
+    def effect_delay(self) -> float:
         """Mean delay from computing a command until its feedback takes effect, s."""
         return self._settings.tilt.dead_time + 0.5 * self._settings.period
 
@@ -177,7 +178,7 @@ class LinearGuidance:
         reference, settings = reference_at(time), self._settings
         future_reference = reference_at(time + settings.thrust_lag)
         down = acceleration_down(
-            settings.height, reference, inputs.now, future_reference, inputs.drag
+            settings.height, reference, inputs.present, future_reference, inputs.drag
         )
         period_ends = time, time + settings.period
         if isinstance(reference.horizontal, TiltCommand):
@@ -186,7 +187,7 @@ class LinearGuidance:
                 Target(north, east, *self._heading(reference_at, at)) for at in period_ends
             )
             return LinearCommand(target, later, down)
-        feedback = self._feedback(reference, reference_at(time + self.acts_after), inputs)
+        feedback = self._feedback(reference, reference_at(time + self.effect_delay), inputs)
 
         def path(at: float) -> Coefficients:
             return self._coefficients(reference_at(at), feedback, down, inputs)
@@ -209,7 +210,7 @@ class LinearGuidance:
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if reference.horizontal is HorizontalMode.ACCELERATION:
             return clamp_length(-wind[0], -wind[1], settings.max_horizontal_acceleration)
-        feedback, drag = [], inputs.deceleration(inputs.now.velocity_ned)
+        feedback, drag = [], inputs.deceleration(inputs.present.velocity_ned)
         for axis in (0, 1):
             position_error = inputs.predicted.position_ned[axis] - at_effect.position_ned[axis]
             velocity_error = inputs.predicted.velocity_ned[axis] - at_effect.velocity_ned[axis]

@@ -70,14 +70,14 @@ class Reach(NamedTuple):
     """Where the vehicle can stop and climb to, relative to where the setpoints ended.
 
     Attributes:
-        place: point (north, east) of the stop if the last rates contain no feedback, m.
-        stop_radius: radius around `place` in which the stop lies if the last rates contain
+        stop_position: point (north, east) of the stop if the last rates contain no feedback, m.
+        stop_radius: radius around `stop_position` in which the stop lies if the last rates contain
             feedback, m.
         max_climb: largest climb, m.
         max_fall: largest fall, m.
     """
 
-    place: tuple[float, float]
+    stop_position: tuple[float, float]
     stop_radius: float
     max_climb: float
     max_fall: float
@@ -85,7 +85,7 @@ class Reach(NamedTuple):
     @property
     def largest_distance(self) -> float:
         """Largest horizontal distance from where the setpoints ended to the stop, m."""
-        return hypot(*self.place) + self.stop_radius
+        return hypot(*self.stop_position) + self.stop_radius
 
 
 class _HeldMotion(NamedTuple):

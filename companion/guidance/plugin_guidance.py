@@ -17,10 +17,10 @@ class PluginGuidance:
         self.guidance = guidance
 
     @property
-    def acts_after(self) -> float:
-        """Like `Guidance.acts_after`, s; raises `UserCodeError` like `command`."""
+    def effect_delay(self) -> float:
+        """Like `Guidance.effect_delay`, s; raises `UserCodeError` like `command`."""
         with naming_user_code("guidance", self.guidance):
-            return float(self.guidance.acts_after)
+            return float(self.guidance.effect_delay)
 
     def command(
         self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput

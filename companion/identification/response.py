@@ -49,8 +49,8 @@ class RateResponse(LagFit):
         flaws = (
             (
                 isnan(self.dead_time) and fit.span == 0.0,
-                "too little excitation: no command changed while rates were measured; both need "
-                "times in s on one clock, and a command at least every 0.5 s",
+                "too little excitation: no command changed while rates were measured; commands and "
+                "rates need times in s on one clock, and commands must be at most 0.5 s apart",
             ),
             (
                 fit.span < needs.span,

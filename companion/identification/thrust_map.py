@@ -44,17 +44,17 @@ class ThrustMap:
             gravity: gravity, m/s²; the map must reach it at a normalised thrust from 0.05 to 0.95.
         """
         if not self.explained >= _LEAST_EXPLAINED:
-            return f"it explains {self.explained:.0%} of the measured thrust"
+            return f"the map explains only {self.explained:.0%} of the measured thrust"
         if not self.slope > 0.0:
             return "the measured thrust falls when the commanded thrust rises"
         if not self.lag + self.dead_time < _LARGEST_DELAY:
             return (
-                f"lag plus dead time of the rotors is {self.lag + self.dead_time:.2f} s, not less "
-                f"than {_LARGEST_DELAY:.2f} s"
+                f"lag plus dead time of the rotors is {self.lag + self.dead_time:.2f} s; it must "
+                f"be less than {_LARGEST_DELAY:.2f} s"
             )
         hover = self.normalised(gravity)
         if not _ACCEPTED_HOVER[0] < hover < _ACCEPTED_HOVER[1]:
-            return f"it puts hover at a thrust of {hover:.2f}"
+            return f"by the map the vehicle hovers at a thrust of {hover:.2f}"
         return None
 
     def described(self) -> str:

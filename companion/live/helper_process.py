@@ -91,7 +91,9 @@ class FlightConnection:
             if self.flight_ended.is_set() or not self._channel.send({**message, "id": number}):
                 has_ended = self.flight_ended.is_set() or not self._channel.is_open
                 reason = (
-                    "the flight has ended" if has_ended else "the flight is too busy to take it"
+                    "the flight has ended"
+                    if has_ended
+                    else "the flight is too busy to take the change"
                 )
                 raise ChangeRefusedError(f"{reason}; nothing has changed")
             async with asyncio.timeout(_ANSWER_TIMEOUT):

@@ -94,7 +94,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             INEFFECTIVE,
             f"attitude paused for {1e3 * samples.longest_pause:.0f} ms, longer than "
             f"deadman.telemetry_stale_ms = {1e3 * stale_after:g}",
-            "setpoints pause with it",
+            "our setpoints pause as long",
             "find what delays the messages: a router, Wi-Fi, a busy computer",
             "ATTITUDE_QUATERNION",
         )
@@ -126,7 +126,7 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.OUR_IDS,
             UNSAFE,
             f"another program uses system/component {our_ids[0]}/{our_ids[1]}, our own ids",
-            "each program receives answers to the other one, and both may send setpoints",
+            "each program receives the answers meant for the other, and both may send setpoints",
             "end the other program, or give each its own link.source_component; if there is none, "
             "a forwarder on the link may send our own frames back to us",
             "frames heard",
@@ -158,7 +158,8 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.OTHER_SETPOINTS,
             UNSAFE,
             f"somebody else sends setpoints{': ' + sender_names if sender_names else ''}",
-            "the autopilot obeys whichever came last, so two would steer one vehicle",
+            "the autopilot obeys the newest setpoint of any sender, so two programs would steer "
+            "one vehicle",
             "end the other program",
             "setpoints heard" if senders else "ATTITUDE_TARGET while disarmed",
         )

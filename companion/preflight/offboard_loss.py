@@ -93,7 +93,7 @@ def worst_reach(
     `hold_time`: time for which the autopilot holds the last rates, s. `brakes`: whether the
     failsafe brakes the vehicle; False: the vehicle drifts until its `drag` stops it.
     """
-    fence = replace(config.fence, places=())
+    fence = replace(config.fence, polygon_deg=())
     max_tilt_rate = config.limits.max_tilt_rate
     loss_failsafe, worst = LossFailsafe(hold_time, brakes, drag, max_tilt_rate, fence), WorstReach()
     motion_before: MotionAtLoss | None = None
@@ -119,7 +119,7 @@ def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str
     `offset`: position when the setpoints stop, relative to where control began, m NED. `reached`:
     how far the vehicle can move from there.
     """
-    north, east = offset[0] + reached.place[0], offset[1] + reached.place[1]
+    north, east = offset[0] + reached.stop_position[0], offset[1] + reached.stop_position[1]
     distance = hypot(north, east)
     outward_factor = 1.0 + reached.stop_radius / distance if distance > 0.0 else 1.0
     farthest: Vector = (north * outward_factor, east * outward_factor, offset[2])

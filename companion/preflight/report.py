@@ -54,7 +54,7 @@ def _entries(findings: Iterable[Finding], accepted: Sequence[str]) -> Renderable
             if finding.fix:
                 entry.append(f"\nWhat to do: {finding.fix}", style="bold")
             if finding.key in accepted:
-                entry.append("\nExcepted by flight.accept")
+                entry.append("\nAccepted by flight.accept")
             entry.append(f"\nSource: {finding.source}", style="dim")
         table.add_row("-", entry)
     return table
@@ -77,7 +77,7 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
             style="bold yellow",
         )
     if unsafe_count:
-        return Text(f"{unsafe_count} unsafe, each excepted by flight.accept", style="bold yellow")
+        return Text(f"{unsafe_count} unsafe, each accepted by flight.accept", style="bold yellow")
     ineffective_count = sum(finding.result is CheckResult.INEFFECTIVE for finding in findings)
     ending = (
         f"; {ineffective_count} ineffective, see above"

@@ -17,6 +17,7 @@ _MIN_EXPECTED_COUNT = 5.0
 _SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
 """Messages that PX4 sends on change, and otherwise at this rate, Hz, whatever rate is requested.
 """
+_FASTER_LOOP = "let the autopilot's main loop run faster"
 _RATE_KEYS = {
     "ATTITUDE_QUATERNION": "link.attitude_rate_hz",
     "LOCAL_POSITION_NED": "link.position_rate_hz",
@@ -81,13 +82,13 @@ def _effective_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
 def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
     """The fault of a message's rate, and the remedy; None: no fault."""
     expected, achieved = rate.requested, rate.achieved
-    key, faster_loop = _RATE_KEYS.get(name), "raise the rate of the autopilot's loop"
+    key = _RATE_KEYS.get(name)
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
     if rate.granted < _MIN_RATE_SHARE * expected:
         return (
             f"{name}: asked for {expected:g} Hz, granted {rate.granted:g} Hz",
-            f"lower {key}, or {faster_loop}" if key else faster_loop,
+            f"lower {key}, or {_FASTER_LOOP}" if key else _FASTER_LOOP,
         )
     is_countable = _is_countable(name, rate, evidence)
     expected = _expected_rate(name, rate)

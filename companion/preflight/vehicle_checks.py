@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from companion.config import Config
-from companion.guidance.fence import Place, height_in_words, inside, local_polygon
+from companion.guidance.fence import LatLon, height_in_words, inside, local_polygon
 from companion.mavlink.messages import dialect
 from companion.preflight.evidence import Evidence, Stage
 from companion.preflight.finding import INEFFECTIVE, NOT_READY, SAFE, UNSAFE, Finding, Key
@@ -208,15 +208,15 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
             source,
         )
         return
-    vehicle_place = Place(position.latitude_deg, position.longitude_deg)
-    if inside(0.0, 0.0, local_polygon(corners, vehicle_place)):
+    vehicle_lat_lon = LatLon(position.latitude_deg, position.longitude_deg)
+    if inside(0.0, 0.0, local_polygon(corners, vehicle_lat_lon)):
         yield Finding(Key.FENCE, SAFE, "the vehicle stands inside its fence", source=source)
         return
     yield Finding(
         Key.FENCE,
         UNSAFE,
-        f"the vehicle is at {vehicle_place.latitude:.5f}, {vehicle_place.longitude:.5f}, outside "
-        "safety.fence_polygon_deg",
+        f"the vehicle is at {vehicle_lat_lon.latitude:.5f}, {vehicle_lat_lon.longitude:.5f}, "
+        "outside safety.fence_polygon_deg",
         "the flight would end as soon as it began",
         "bring it inside, or correct the corners: each is [latitude, longitude]",
         source,

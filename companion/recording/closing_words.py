@@ -51,7 +51,7 @@ class ClosingWords(NamedTuple):
     """The figures and advice for the headline, or how and why the flight ended early."""
     next_command: str | None
     """Suggested next command line, or None."""
-    good: bool
+    was_good: bool
     """Whether the flight was good; see `is_good`."""
     completed: bool
     """Whether the maneuvers were flown to their end."""

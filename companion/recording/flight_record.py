@@ -10,7 +10,7 @@ with their units. A channel without messages has 0 rows. NaN: not known, or does
 There are three kinds of time. "Our clock" is event-loop time; the flight began when our clock read
 `start_time`. `vehicle_time_s` is the vehicle's clock. Phases, events, alarms and the channel
 `motion` have the time since the flight began; `since_start` converts our clock to this time. In
-lockstep or on a virtual clock, our clock is the vehicle's, and `epoch` is 0.
+lockstep or on a virtual clock, our clock is the vehicle's, and `clock_epoch` is 0.
 """
 
 import json
@@ -62,7 +62,7 @@ class FlightRecord:
     content: McapContent
     start_time: float
     """Time when the flight began, s on our clock."""
-    epoch: float
+    clock_epoch: float
     """Unix time at which our clock read 0, s; 0 if our clock is the vehicle's."""
     metadata: Mapping[str, Mapping[str, str]]
     """Metadata records by name, such as "flight" with versions, start and seed."""
@@ -117,7 +117,7 @@ class FlightRecord:
     def duration(self) -> float:
         """Time from the beginning of the flight to the last row or event, s."""
         last_times = [messages[-1][0] for messages in self.content.messages.values() if messages]
-        return max(last_times) * 1e-9 - self.epoch - self.start_time if last_times else 0.0
+        return max(last_times) * 1e-9 - self.clock_epoch - self.start_time if last_times else 0.0
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
@@ -141,7 +141,9 @@ class FlightRecord:
         for time_ns, data in self.content.messages["/log"]:
             with record_errors(self.folder):
                 level, text, source = cdr.log_of(data)
-            events.append(Event(time_ns * 1e-9 - self.epoch - self.start_time, text, level, source))
+            events.append(
+                Event(time_ns * 1e-9 - self.clock_epoch - self.start_time, text, level, source)
+            )
         return tuple(events)
 
     @cached_property
@@ -195,7 +197,8 @@ def read_flight(folder: Path | str) -> FlightRecord:
     if not flight_metadata and has_config and content.damage is None:
         flight_metadata.update(began_s="0.0", epoch_s="0.0")
     try:
-        start_time, epoch = float(flight_metadata["began_s"]), float(flight_metadata["epoch_s"])
+        start_time = float(flight_metadata["began_s"])
+        clock_epoch = float(flight_metadata["epoch_s"])
     except (KeyError, ValueError) as error:
         reason = content.damage or "it does not say when the flight began"
         raise RecordError(f"{path}: not the record of a flight: {reason}") from error
@@ -206,7 +209,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
             "record with the version that wrote it: companion "
             f"{flight_metadata.get('companion', 'unknown')}"
         )
-    return FlightRecord(folder, content, start_time, epoch, content.metadata)
+    return FlightRecord(folder, content, start_time, clock_epoch, content.metadata)
 
 
 def _not_a_flight_reason(path: Path, error: OSError) -> str:

@@ -34,7 +34,8 @@ class FlightRecorder(BackgroundFile[Entry]):
 
     Args:
         path: file that `open` creates.
-        epoch: unix time at which the flight's clock read 0, s; 0 if that clock is the vehicle's.
+        clock_epoch: unix time at which the flight's clock read 0, s; 0 if that clock is the
+            vehicle's.
         clock: clock of the flight, s.
         on_failure: see `BackgroundFile`.
         on_bad_entry: called with a message, from the writing thread, at the first entry that cannot
@@ -45,13 +46,13 @@ class FlightRecorder(BackgroundFile[Entry]):
     def __init__(
         self,
         path: Path,
-        epoch: float,
+        clock_epoch: float,
         clock: Callable[[], float],
         on_failure: Callable[[str], None] | None = None,
         on_bad_entry: Callable[[str], None] | None = None,
         stream: SendBatch | None = None,
     ) -> None:
-        self._epoch, self._clock = epoch, clock
+        self._clock_epoch, self._clock = clock_epoch, clock
         self._on_bad_entry, self._stream = on_bad_entry, stream
         super().__init__(path, _MAX_WAITING_ENTRIES, on_failure)
 
@@ -59,7 +60,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         self._writer = McapWriter(self.path, self._stream)
 
     def _write(self, items: Sequence[Entry]) -> None:
-        writer, epoch_ns = self._writer, round(self._epoch * 1e9)
+        writer, epoch_ns = self._writer, round(self._clock_epoch * 1e9)
         for time, encoder, values in items:
             try:
                 encoder(writer, epoch_ns + round(time * 1e9), values)
@@ -92,7 +93,7 @@ class FlightRecorder(BackgroundFile[Entry]):
 
     def begin(self, start_time: float, values: Mapping[str, str]) -> None:
         """Record the beginning of the flight (s on our clock), and further values as metadata."""
-        times = {"began_s": repr(start_time), "epoch_s": repr(self._epoch)}
+        times = {"began_s": repr(start_time), "epoch_s": repr(self._clock_epoch)}
         self.metadata("flight", {**times, **values})
 
     def phase(self, name: str, waits_for: str) -> None:

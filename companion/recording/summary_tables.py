@@ -30,7 +30,7 @@ def flight_table(summary: Summary) -> RenderableType:
 
 def styled_text(closing_words: ClosingWords) -> Text:
     """The closing words as coloured text."""
-    style = "green" if closing_words.good else "yellow" if closing_words.completed else "red"
+    style = "green" if closing_words.was_good else "yellow" if closing_words.completed else "red"
     text = Text(closing_words.headline, style=f"bold {style}")
     for line in closing_words.lines:
         text.append(f"\n{line}", style="yellow" if line.startswith("!") else "not bold default")
@@ -110,7 +110,7 @@ def _tracking(summary: Summary) -> RenderableType:
         errors = maneuver.horizontal_rms, maneuver.horizontal_max
         level = [_with_unit(error, "m", 2) for error in errors]
         if maneuver.open_loop:
-            level = ["open loop", f"{maneuver.drift:.2f} m away"]
+            level = ["open loop", f"{maneuver.drift:.2f} m of drift"]
         heights = _with_unit(maneuver.height_rms, "m", 2), _with_unit(maneuver.height_max, "m", 2)
         table.add_row(maneuver.name, *level, *heights)
     return table
@@ -125,7 +125,7 @@ def _predictive_words(figures: PredictiveFigures) -> Text:
     unused_text = ", ".join(f"{count} {name}" for name, count in figures.unused_answers.items())
     if unused_text:
         words += (
-            f"; linear guidance replaced {sum(figures.unused_answers.values())} others: "
+            f"; linear guidance replaced {sum(figures.unused_answers.values())} other answers: "
             f"{unused_text}"
         )
     return Text(words)

@@ -26,15 +26,16 @@ class TlogWriter(BackgroundFile[TimedFrame]):
 
     Args:
         path: file that `open` creates.
-        epoch: unix time at which the flight's clock read 0, s; 0 if that clock is the vehicle's.
+        clock_epoch: unix time at which the flight's clock read 0, s; 0 if that clock is the
+            vehicle's.
         on_failure: see `BackgroundFile`.
     """
 
     def __init__(
-        self, path: Path, epoch: float, on_failure: Callable[[str], None] | None = None
+        self, path: Path, clock_epoch: float, on_failure: Callable[[str], None] | None = None
     ) -> None:
         super().__init__(path, _MAX_WAITING_FRAMES, on_failure)
-        self._epoch = epoch
+        self._clock_epoch = clock_epoch
 
     def __call__(self, time: float, frame: bytes) -> None:
         """Take a frame that was seen at `time`, s on the flight's clock."""
@@ -44,9 +45,9 @@ class TlogWriter(BackgroundFile[TimedFrame]):
         self._file = self.path.open("wb", buffering=1 << 16)
 
     def _write(self, items: Sequence[TimedFrame]) -> None:
-        epoch, write = self._epoch, self._file.write
+        clock_epoch, write = self._clock_epoch, self._file.write
         for time, frame in items:
-            write(_STAMP.pack(round((epoch + time) * 1e6)) + frame)
+            write(_STAMP.pack(round((clock_epoch + time) * 1e6)) + frame)
         self._file.flush()
 
     def _sync(self) -> None:

@@ -6,7 +6,7 @@ from companion.user_code import MESSAGE_START
 
 ADVICE_BY_MONITOR: Mapping[str, str] = {
     "unheard": "check cable, radio and power: the vehicle was not heard any more",
-    "silence": "fix the cause named above: the telemetry, its values, or this computer",
+    "silence": "fix the cause named above: telemetry, invalid values in it, or this computer",
     "frozen": "find what repeats old telemetry: a relay, a bridge, or the autopilot's estimator",
     "clock": "find why the autopilot restarted or its clock jumped; check its power supply",
     "disarmed": "find who disarmed the vehicle in flight: the pilot's switch or the autopilot",

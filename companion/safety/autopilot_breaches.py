@@ -87,7 +87,8 @@ def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
         return None
     return (
         f"the estimator was reset: {resets.position_shift:.1f} m and "
-        f"{degrees(resets.heading_shift):.0f}° of heading in total; the references moved as much"
+        f"{degrees(resets.heading_shift):.0f}° of heading in total; the references were moved by "
+        "the same amount"
     )
 
 

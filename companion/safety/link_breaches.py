@@ -158,9 +158,9 @@ def rare_foreign_setpoint(snapshot: Snapshot, _: bool) -> str | None:
     )
 
 
-def frozen(snapshot: Snapshot, _: bool) -> str | None:
+def frozen_telemetry(snapshot: Snapshot, _: bool) -> str | None:
     """Attitude, position or velocity repeats one measurement under new time stamps."""
-    repeated_telemetry = snapshot.health.frozen
+    repeated_telemetry = snapshot.health.frozen_telemetry
     return None if repeated_telemetry is None else f"frozen telemetry: {repeated_telemetry}"
 
 

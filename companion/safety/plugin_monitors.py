@@ -71,14 +71,14 @@ def _monitors_named(name: str, config: Config) -> tuple[Monitor, ...]:
         guarded_monitor,
         replace(
             guarded_monitor,
-            name=f"{name} (its fault)",
+            name=f"{name} (error)",
             check=guarded_check.breach_of_fault,
             action=Action.HAND_BACK,
             raise_after=0.0,
         ),
         replace(
             guarded_monitor,
-            name=f"{name} (its time)",
+            name=f"{name} (too slow)",
             check=guarded_check.breach_of_time,
             action=Action.WARN,
             raise_after=_SLOW_DURATION,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from companion.attitude import Quaternion
 from companion.control.loop_record import UnansweredReason
-from companion.guidance.fence import Place
+from companion.guidance.fence import LatLon
 from companion.guidance.reference import NorthEast, Vector
 from companion.vehicle.records import Battery, EstimatorStatus, Gps
 from companion.vehicle.timesync import Uplink
@@ -43,7 +43,7 @@ class Motion(NamedTuple):
     """Distance from the reference, m; None without a reference."""
     thrust: float | None = None
     """Thrust last sent, 0..1; None while idle on the ground and without a command."""
-    origin: Place | None = None
+    origin: LatLon | None = None
     """Latitude and longitude of the fence's centre, or None if they are unknown."""
     acceleration: NorthEast = (0.0, 0.0)
     """Estimated horizontal acceleration, m/s², NED."""
@@ -109,7 +109,7 @@ class Health(NamedTuple):
     (`SetpointEcho`)."""
     any_foreign_report: bool = False
     """Whether `foreign_reports` was above 0 at any time since control began."""
-    frozen: str | None = None
+    frozen_telemetry: str | None = None
     """Which telemetry repeats itself although it must change (`FrozenTelemetry`), in words."""
 
 

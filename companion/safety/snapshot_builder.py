@@ -6,7 +6,7 @@ from companion.attitude.representation import wrap_angle
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.heading_frame import HeadingFrame
-from companion.guidance.fence import FenceCentre, Place
+from companion.guidance.fence import FenceCentre, LatLon
 from companion.guidance.reference import Vector, minus
 from companion.safety.counter_window import CounterWindow
 from companion.safety.frozen_telemetry import FrozenTelemetry
@@ -23,7 +23,7 @@ from companion.safety.snapshot import (
 )
 from companion.vehicle.link import Link
 
-_MAX_PLACE_AGE = 1.0
+_MAX_LAT_LON_AGE = 1.0
 """Largest age of the GLOBAL_POSITION_INT that gives the place where control begins, s."""
 _GAP_COUNTING_TIME = 5.0
 """Time over which gaps in the setpoints are counted, s."""
@@ -55,7 +55,7 @@ class SnapshotBuilder:
         self._frames_heard = 0
         self._heard_at = 0.0
         self.fence_centre_ned: Vector | None = None
-        self._fence_place: Place | None = None
+        self._fence_lat_lon: LatLon | None = None
         self._control_start = 0.0
         self._heading_frame_at_start = HeadingFrame()
         self._shift_at_start: Vector = (0.0, 0.0, 0.0)
@@ -72,10 +72,10 @@ class SnapshotBuilder:
         state, resets = self._link.state, self._loop.resets
         motion = self._guidance_loop.motion
         self.fence_centre_ned = None if motion is None else motion.position_ned
-        self._fence_place = self._current_place(now)
+        self._fence_lat_lon = self._current_lat_lon(now)
         if centre is not None:
             self.fence_centre_ned = minus(centre.position_ned, resets.position_shift)
-            self._fence_place = centre.place
+            self._fence_lat_lon = centre.lat_lon
         self._control_start = now
         self._heading_frame_at_start, self._shift_at_start = resets.frame, resets.position_shift
         resets.largest_tilt_jump = 0.0
@@ -90,7 +90,7 @@ class SnapshotBuilder:
         """Centre of the fence in the frame without resets; None: no position, or no control yet."""
         if self.fence_centre_ned is None:
             return None
-        return FenceCentre(self.fence_centre_ned, self._fence_place)
+        return FenceCentre(self.fence_centre_ned, self._fence_lat_lon)
 
     @property
     def fence_centre(self) -> FenceCentre | None:
@@ -98,7 +98,7 @@ class SnapshotBuilder:
         if self.fence_centre_ned is None:
             return None
         negative_shift = minus((0.0, 0.0, 0.0), self._loop.resets.position_shift)
-        return FenceCentre(minus(self.fence_centre_ned, negative_shift), self._fence_place)
+        return FenceCentre(minus(self.fence_centre_ned, negative_shift), self._fence_lat_lon)
 
     def long_silence(self, now: float) -> float | None:
         """Silence of the vehicle at `now`, s; None if it is not longer than `HEARD_TIMEOUT_S`."""
@@ -160,7 +160,7 @@ class SnapshotBuilder:
             self._link.state.height,
             guidance_loop.tracking_error,
             None if idle else loop.record.thrust,
-            self._fence_place,
+            self._fence_lat_lon,
             guidance_loop.acceleration,
             guidance_loop.estimate.disturbance,
             guidance_loop.remaining_braking_time > 0.0,
@@ -175,7 +175,7 @@ class SnapshotBuilder:
             uplink=timesync.uplink,
             foreign_reports=self.echo.foreign_reports(now),
             any_foreign_report=self.echo.any_foreign,
-            frozen=self._find_frozen(now),
+            frozen_telemetry=self._find_frozen(now),
         )
 
     def _find_frozen(self, now: float) -> str | None:
@@ -196,9 +196,9 @@ class SnapshotBuilder:
             self._heading_drift.drift(now),
         )
 
-    def _current_place(self, now: float) -> Place | None:
+    def _current_lat_lon(self, now: float) -> LatLon | None:
         """Latitude and longitude of the vehicle, or None if they are old."""
         newest = self._link.state.global_position
-        if newest is None or now - newest.received > _MAX_PLACE_AGE:
+        if newest is None or now - newest.received > _MAX_LAT_LON_AGE:
             return None
-        return Place(newest.latitude_deg, newest.longitude_deg)
+        return LatLon(newest.latitude_deg, newest.longitude_deg)

@@ -63,7 +63,10 @@ def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
         Monitor("unheard", unheard, Action.LISTEN, stream=StreamEffect.STOPS_AT_ONCE),
         Monitor("silence", silence, _HAND_BACK, stream=StreamEffect.STOPS_AT_ONCE),
         Monitor(
-            "frozen", link_breaches.frozen, _HAND_BACK, stream=StreamEffect.ENDS_WITH_ZERO_RATES
+            "frozen",
+            link_breaches.frozen_telemetry,
+            _HAND_BACK,
+            stream=StreamEffect.ENDS_WITH_ZERO_RATES,
         ),
         Monitor(
             "clock", link_breaches.clock_changed, _HAND_BACK, stream=StreamEffect.STOPS_AT_ONCE

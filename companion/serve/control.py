@@ -149,9 +149,7 @@ class ServedControl:
         if refusal is None and flight is not None:
             refusal = _FLIGHT_ENDING if flight.is_ending else None
         elif refusal is None and request is None:
-            refusal = (
-                "too many programs send setpoints, and yours were forgotten; let the others stop"
-            )
+            refusal = "too many programs send setpoints, so yours were dropped; stop the others"
         elif refusal is None and request is not None:
             refusal = self._flights.fence.refusal()
             if refusal is None and on_ground:

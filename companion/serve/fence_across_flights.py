@@ -67,7 +67,7 @@ class FenceAcrossFlights:
                 "disarm"
             )
         offset = minus(position.position_ned, kept_centre.position_ned)
-        breach = self._fence.breach(offset, self._state.height, kept_centre.place)
+        breach = self._fence.breach(offset, self._state.height, kept_centre.lat_lon)
         if breach is None:
             return None
         return f"outside the fence of the first flight: {breach}; fly back, or land and disarm"

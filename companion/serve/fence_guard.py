@@ -119,13 +119,19 @@ class _FenceFrame(NamedTuple):
 
     def breach(self, fence: Fence, position: Vector, margin: float) -> Breach | None:
         """The breach at a position, NED in the frame of `centre`; None: no breach."""
-        return fence.breach(*self._fence_coordinates(position), self.centre.place, margin)
+        return fence.breach(*self._fence_coordinates(position), self.centre.lat_lon, margin)
 
     def breach_of_stop(self, fence: Fence, state: "_MotionState", margin: float) -> Breach | None:
         """The breach at the place where the vehicle would stop from a state; None: no breach."""
         offset, height = self._fence_coordinates(state.position)
         return fence.breach_at_stopping_point(
-            offset, state.velocity, height, self.centre.place, margin, state.acceleration, self.wind
+            offset,
+            state.velocity,
+            height,
+            self.centre.lat_lon,
+            margin,
+            state.acceleration,
+            self.wind,
         )
 
     def _fence_coordinates(self, position: Vector) -> tuple[Vector, float | None]:

@@ -66,7 +66,8 @@ class ReportPages:
         _lower_priority(self._process.pid)
         output, errors = self._wait_for_output(self._process)
         if self._process.returncode != 0:
-            raise RuntimeError(" ".join(errors.split()) or f"exit {self._process.returncode}")
+            exit_text = f"its process ended with exit code {self._process.returncode}"
+            raise RuntimeError(" ".join(errors.split()) or exit_text)
         return output.strip()
 
     def _wait_for_output(self, process: "subprocess.Popen[str]") -> tuple[str, str]:
@@ -84,7 +85,7 @@ class ReportPages:
                     return output
             if self._is_stopping or time.monotonic() > deadline:
                 process.kill()
-                late_text = f"it was not written within {_PAGE_TIMEOUT:g} s"
+                late_text = f"the page was not written within {_PAGE_TIMEOUT:g} s"
                 raise RuntimeError(_INTERRUPTED if self._is_stopping else late_text)
 
 

@@ -10,7 +10,7 @@ from math import cos, degrees, hypot, radians
 from companion.attitude import is_unit
 from companion.attitude.rotation import euler_angles
 from companion.config import Config
-from companion.guidance.fence import EARTH_RADIUS, Place, local_offset
+from companion.guidance.fence import EARTH_RADIUS, LatLon, local_offset
 from companion.guidance.reference import Vector
 from companion.mavlink.codec import decode_attitude
 from companion.mavlink.errors import LinkError
@@ -147,5 +147,5 @@ class OriginEstimate:
 
 
 def _distance(a: Origin, b: Origin) -> float:
-    offset = local_offset(Place(a.latitude, a.longitude), Place(b.latitude, b.longitude))
+    offset = local_offset(LatLon(a.latitude, a.longitude), LatLon(b.latitude, b.longitude))
     return hypot(*offset, a.altitude - b.altitude)

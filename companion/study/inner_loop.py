@@ -77,7 +77,7 @@ class InnerLoop:
             commanded_rates.append(rates)
         return LoopFlight(np.array(attitudes), np.array(commanded_rates), np.array(body_rates))
 
-    def rate_time_63(self) -> float:
+    def rate_time_to_63_percent(self) -> float:
         """Time until the roll rate reaches 1 − 1/e (63 %) of a step of its setpoint in hover, s.
 
         The time includes all delays, and can be compared with 1/p of a planner with gain p. The

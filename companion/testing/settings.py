@@ -10,7 +10,7 @@ from sitl_mock.config.section import explain
 from sitl_mock.settings import MockSettings
 
 
-def complete_mock(section: Mapping[str, Any]) -> dict[str, Any]:
+def mock_with_defaults(section: Mapping[str, Any]) -> dict[str, Any]:
     """The section `mock` with the defaults of its autopilot written out.
 
     Raises:
@@ -22,7 +22,7 @@ def complete_mock(section: Mapping[str, Any]) -> dict[str, Any]:
         raise ConfigError(explain(error, MockSettings)) from error
 
 
-def mock_with(section: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def mock_with_changes(section: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """The complete section `mock` with some keys changed.
 
     A change leaves all other keys unchanged: `wind.speed_m_s` keeps the gusts. The two changes
@@ -39,11 +39,11 @@ def mock_with(section: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
     for key, value in changes.items():
         changes_by_depth.setdefault(key.count("."), {})[key] = value
     changed_section = dict(section) | changes_by_depth.pop(0, {})
-    complete_section = complete_mock(changed_section)
+    complete_section = mock_with_defaults(changed_section)
     for depth in sorted(changes_by_depth):
         for key, value in changes_by_depth[depth].items():
             _set_nested(complete_section, key.split("."), value)
-        complete_section = complete_mock(complete_section)
+        complete_section = mock_with_defaults(complete_section)
     return complete_section
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from companion.tuning.feedback import Complex
 
-_REAL_PART = 1e-2
+_REAL_PART_OF_S = 1e-2
 """Real part of the frequencies s, 1/s; the integrators at s = 0 lie to the left of them."""
 _HIGHEST_FREQUENCY = 150.0
 """Highest frequency of the analysis, rad/s; the Nyquist frequency of guidance at 50 Hz is 157."""
@@ -19,12 +19,12 @@ _FREQUENCY_COUNT = 120
 def frequencies() -> Complex:
     """Complex frequencies s (n,) for margins and errors, rad/s.
 
-    The real part is `_REAL_PART`. The imaginary part rises from 0 to `_HIGHEST_FREQUENCY`, with
-    most points above 0.05 rad/s.
+    The real part is `_REAL_PART_OF_S`. The imaginary part rises from 0 to `_HIGHEST_FREQUENCY`,
+    with most points above 0.05 rad/s.
     """
     low = np.geomspace(1e-3, 0.05, 12)[:-1]
     high = np.geomspace(0.05, _HIGHEST_FREQUENCY, _FREQUENCY_COUNT)
-    s: Complex = _REAL_PART + 1j * np.concatenate([[0.0], low, high])
+    s: Complex = _REAL_PART_OF_S + 1j * np.concatenate([[0.0], low, high])
     s.setflags(write=False)
     return s
 

@@ -58,8 +58,8 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         *_comparison_lines(before, after),
         f"disturbances: gusts of {proposal.disturbances.gust:g} m/s, noise: "
         f"{proposal.disturbances.source}",
-        f"required: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°; reached in spite of "
-        "errors of the vehicle model:",
+        f"required margins: {aims.gain_db:g} dB and {aims.phase_deg:g}°; with errors of the "
+        "vehicle model they are:",
     ]
     lines += [
         f"margin {_mismatch_text(mismatch)}: {margins.sentence()}"
@@ -163,11 +163,11 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
     return {
         "drag_per_s": drag,
         "quadratic_drag_per_m": drag,
-        "gain_per_s": f"before {untuned.planner.gain_per_s:g}; {gain_reason}",
-        "position_weight_per_s4": f"before {weights.position:.3g}; a stiffer hold tracks better, "
+        "gain_per_s": f"was {untuned.planner.gain_per_s:g}; {gain_reason}",
+        "position_weight_per_s4": f"was {weights.position:.3g}; a stiffer hold tracks better, "
         "a softer one has more margin",
-        "velocity_weight_per_s2": f"before {weights.velocity:.3g}; a larger one brings errors of "
+        "velocity_weight_per_s2": f"was {weights.velocity:.3g}; a larger one brings errors of "
         "the estimated velocity into the position",
-        "disturbance_bandwidth_rad_s": f"before {disturbance_bandwidth(untuned):.3g}; a quicker "
+        "disturbance_bandwidth_rad_s": f"was {disturbance_bandwidth(untuned):.3g}; a quicker "
         "observer sees gusts sooner and brings more noise into the rates",
     }

@@ -127,7 +127,7 @@ def rate_hold(value: float, _: Values, settings: CompanionSettings) -> Problem |
     if value > MAX_RATE_HOLD_TIME:
         return Problem(
             UNSAFE,
-            f"when setpoints stop, the last rates are held for {value:g} s: 0.4 rad/s become "
+            f"when setpoints stop, the last rates are held for {value:g} s: at 0.4 rad/s that is "
             f"{degrees(0.4 * value):.0f}° of tilt",
             set_to,
         )

@@ -57,8 +57,8 @@ def approach_speed(distance: float, deceleration: float, max_speed: float) -> fl
 def lean_acceleration(q: Quaternion) -> tuple[float, float]:
     """Return the acceleration (north, east, m/s^2) of a vehicle that holds its height at ``q``."""
     north, east, down = body_z(q)
-    vertical_per_g = max(down, _MIN_COS_TILT) / GRAVITY
-    return (-north / vertical_per_g, -east / vertical_per_g)
+    cos_tilt_over_gravity = max(down, _MIN_COS_TILT) / GRAVITY
+    return (-north / cos_tilt_over_gravity, -east / cos_tilt_over_gravity)
 
 
 class PositionHold:

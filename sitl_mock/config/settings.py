@@ -73,7 +73,7 @@ class VehicleSettings(Section):
     """UDP port of the JSON control channel on 127.0.0.1; 0 = none."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
-    """Vehicle seconds per wall second; lockstep ignores it."""
+    """How much faster than real time the simulation runs; ignored in lockstep."""
     inner_loop_hz: Literal[100, 250, 800] = 250
     """Inner loop rate, which limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE
     instead. The rate 100, which PX4's IMU_INTEG_RATE allows, was not recorded; it takes the least

@@ -22,7 +22,7 @@ class DatagramPipe:
         self._delayed_count = count()
         self._held_back_datagram: bytes | None = None
 
-    def is_transparent(self, faults: tuple[LinkFault, ...]) -> bool:
+    def passes_unchanged(self, faults: tuple[LinkFault, ...]) -> bool:
         """Whether no fault is active and no datagram is held back."""
         return not faults and not self._delayed_datagrams and self._held_back_datagram is None
 

@@ -25,7 +25,7 @@ from sitl_mock.physics.rate_shaping import (
     shape,
     shaping_constants,
 )
-from sitl_mock.physics.rigid_body import Body, Load, Motion, advance, body_of, derivative
+from sitl_mock.physics.rigid_body import Load, Motion, RigidBody, advance, body_of, derivative
 from sitl_mock.physics.rotors import (
     STOPPED_ALLOCATION,
     Allocation,
@@ -48,7 +48,7 @@ class MultirotorConstants(NamedTuple):
     mass: float  # kg
     tilt_torque: float  # N m per throttle difference, about x and y
     yaw_torque: float  # N m per throttle difference, about z
-    body: Body
+    body: RigidBody
     rotors: RotorConstants
     rate_loop: RateConstants
     is_shaping: bool  # whether setpoints are shaped, by `shaping`

@@ -16,12 +16,12 @@ Load = tuple[float, float, float, float, float, float, float]
 """(specific thrust [m/s^2], torque x, y, z [N m, FRD], wind n, e, d [m/s])."""
 
 GRAVITY = 9.80665
-"""Standard gravity, m/s^2, which autopilots assume; `Body.gravity` may differ."""
+"""Standard gravity, m/s^2, which autopilots assume; `RigidBody.gravity` may differ."""
 NO_AXIS_DRAG = 0.0, 0.0, 0.0
 """Coefficients of a body that has no drag along its own axes."""
 
 
-class Body(NamedTuple):
+class RigidBody(NamedTuple):
     """Constants of the rigid body."""
 
     inertia_x: float  # kg m^2, about body x
@@ -35,9 +35,9 @@ class Body(NamedTuple):
     gravity: float  # m/s^2
 
 
-def body_of(airframe: AirframeConfig) -> Body:
+def body_of(airframe: AirframeConfig) -> RigidBody:
     """Return the rigid body of an airframe."""
-    return Body(
+    return RigidBody(
         *airframe.inertia_kg_m2,
         drag=airframe.drag_n_s_per_m / airframe.mass_kg,
         quadratic_drag=airframe.quadratic_drag_n_s2_per_m2 / airframe.mass_kg,
@@ -53,7 +53,7 @@ def _per_mass(mass: float, along_axes: Vector) -> Vector:
     return x / mass, y / mass, z / mass
 
 
-def derivative(motion: Motion, load: Load, body: Body) -> Motion:
+def derivative(motion: Motion, load: Load, body: RigidBody) -> Motion:
     """Return the time derivative of a motion (Newton, Euler, quaternion kinematics).
 
     v' = g - T z_body - (drag + quadratic |u|) u - f with u = v - wind, specific thrust T and drag
@@ -109,7 +109,7 @@ def _motion_after(motion: Motion, slope: Motion, dt: float) -> Motion:
     )
 
 
-def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, Vector]:
+def advance(motion: Motion, load: Load, body: RigidBody, dt: float) -> tuple[Motion, Vector]:
     """Integrate one step of `dt` seconds under a constant load (classical Runge-Kutta).
 
     Returns:

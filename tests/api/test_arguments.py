@@ -139,7 +139,7 @@ def test_a_copied_reference_holds_plain_numbers():
     "changes", [{"horizontal": Coefficients(0.0, 0.0)}, {"vertical": 0.5}, {"vertical": None}]
 )
 def test_a_command_of_another_type_is_refused_with_the_types_that_are_meant(changes):
-    with pytest.raises(TypeError, match=rf"^{next(iter(changes))} is a \w+Mode"):
+    with pytest.raises(TypeError, match=rf"^{next(iter(changes))} must be a \w+Mode"):
         checked_copy(Reference(REST)._replace(**changes))
 
 
@@ -173,7 +173,7 @@ def test_what_is_wrong_in_a_command_is_named(wrong, field, value):
 
 @pytest.mark.parametrize("what", [None, REST, "hover"])
 def test_a_reference_is_a_reference(what):
-    with pytest.raises(TypeError, match=r"a reference is a companion\.Reference"):
+    with pytest.raises(TypeError, match=r"a reference must be a companion\.Reference"):
         checked_copy(what)
 
 

@@ -98,7 +98,7 @@ class Forgetful(Remembering):
 
 class Stumbling(LinearGuidance):
     def command(self, reference_at, time, inputs):
-        if inputs.now.position_ned[0] > 0.5:
+        if inputs.present.position_ned[0] > 0.5:
             return self.direction()
         return super().command(reference_at, time, inputs)
     def direction(self):
@@ -122,12 +122,12 @@ class Empty(LinearGuidance):
 
 class Nowhere(LinearGuidance):
     def command(self, reference_at, time, inputs):
-        return super().command(reference_at, time, inputs)._replace(down=float("nan"))
+        return super().command(reference_at, time, inputs)._replace(acceleration_down=float("nan"))
 
 class Greedy(LinearGuidance):
     def command(self, reference_at, time, inputs):
         target, later, down = super().command(reference_at, time, inputs)
-        return target, later, -1e6 if inputs.now.velocity_ned[0] > 0.5 else down
+        return target, later, -1e6 if inputs.present.velocity_ned[0] > 0.5 else down
 
 class Unset(Stumbling):
     def direction(self):
@@ -136,7 +136,7 @@ class Unset(Stumbling):
 class Broken(LinearGuidance):
     def command(self, reference_at, time, inputs):
         target, later, down = super().command(reference_at, time, inputs)
-        moving = inputs.now.position_ned[0] > 0.5
+        moving = inputs.present.position_ned[0] > 0.5
         return (target, later, float("nan")) if moving else (target, later, down)
 """
 FUNCTIONS = "mine nothing pair raising later blank refusing leaving number wild lazy one_sided"
@@ -302,7 +302,7 @@ def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
         ("guidance: {kind: empty}", "empty cannot be flown: TypeError.*NoneType.*linear.Guidance"),
         (
             "guidance: {kind: nowhere}",
-            "nowhere .*its command and `acts_after` must be finite.*down=nan",
+            "nowhere .*its command and `effect_delay` must be finite.*acceleration_down=nan",
         ),
     ],
 )

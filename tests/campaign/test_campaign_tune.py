@@ -141,7 +141,7 @@ def test_the_result_tells_how_sure_it_is_and_can_be_included(whole, tmp_path):
     assert "14 candidates over 4 flights each" in said
     path = tmp_path / "result.yaml"
     path.write_text(result_text(result, configured_values(made.base, FILE["tune"]["search"])))
-    assert "before 5; the best " in path.read_text()
+    assert "was 5; the best " in path.read_text()
     assert load(path).planner.gain_per_s == found.best.values["planner.gain_per_s"]
 
 

@@ -284,11 +284,11 @@ def test_the_reasons_say_where_a_value_lies_among_the_best(tmp_path):
     )
     reasons = [line for line in told.splitlines() if line.startswith("  #")]
     assert reasons == [
-        "  # before exact; 2 of the best 3 candidates have this value",
-        "  # not set before; the best 3 candidates have 8 to 8, searched from 2 to 8; this value "
+        "  # was exact; 2 of the best 3 candidates have this value",
+        "  # was not set; the best 3 candidates have 8 to 8, searched from 2 to 8; this value "
         "lies at an end of the searched range: widen the range",
-        "  # not set before; the best 3 candidates have 1 to 1.2, searched from 0.2 to 2",
-        "  # not set before; the best 3 candidates have 1.1 to 1.9, searched from 1 to 2; this "
+        "  # was not set; the best 3 candidates have 1 to 1.2, searched from 0.2 to 2",
+        "  # was not set; the best 3 candidates have 1.1 to 1.9, searched from 1 to 2; this "
         "key matters little here",
     ]
     assert "The interval contains 1, so the result may not be better" in told

@@ -11,7 +11,7 @@ import sys
 from typing import Any
 
 from companion.config.files import load, shipped
-from companion.testing.settings import complete_mock
+from companion.testing.settings import mock_with_defaults
 
 _LIMITS = {
     "limits.max_tilt_deg": 54,
@@ -48,7 +48,7 @@ _FILTER_NOISE = (
 
 def vehicle(autopilot: str, factor: float) -> dict[str, Any]:
     """Keys of the mock vehicle: drag, times of the rate loop, and noise, all times `factor`."""
-    whole: Any = complete_mock({"autopilot": autopilot})
+    whole: Any = mock_with_defaults({"autopilot": autopilot})
     air, sensors = whole["airframe"], whole["sensors"]
     keys = {f"airframe.{key}": factor * air[key] for key in (*_DRAG, "rotor_lag_ms")}
     keys |= {f"airframe.{key}": [factor * share for share in air[key]] for key in _AXIS_DRAG}

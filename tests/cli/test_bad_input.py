@@ -70,7 +70,7 @@ def config(tmp_path, text):
         ),
         (
             "safety: {fence_polygon_m: [[1, 1], [1, 5], [5, 1]]}",
-            "must surround [0, 0], where control begins; move its corners",
+            "must surround [0, 0], the point where control begins; move its corners",
         ),
         (
             "limits: {max_tilt_deg: 10}\n"
@@ -80,7 +80,10 @@ def config(tmp_path, text):
         ),
         ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
         ("circle: {radius_m: 1, speed_m_s: 4}", "° of tilt, limits.max_tilt_deg allows 35"),
-        ("circle: {radius_m: 26}", "circle: from 33.85 s on it goes up to 2.0 m outside the fence"),
+        (
+            "circle: {radius_m: 26}",
+            "circle: from 33.85 s on the vehicle goes up to 2.0 m outside the fence",
+        ),
         (
             "flight: {maneuvers: [identify]}\nlimits: {max_tilt_deg: 15}",
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed 0.75 × limits",
@@ -168,7 +171,7 @@ def test_check_config_refuses_what_a_flight_would_refuse(capsys, tmp_path):
         ("flight: {maneuvers: [trajectory], trajectory: /not/there.yaml}", "/not/there.yaml"),
         (
             f"flight: {{maneuvers: [trajectory], trajectory: {far}}}",
-            "shrink it or widen the fence",
+            "make the path smaller, or widen the fence",
         ),
     ):
         code, _, err = run(capsys, "check-config", config(tmp_path, text))

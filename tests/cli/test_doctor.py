@@ -88,7 +88,7 @@ def test_it_finds_mends_and_undoes(capsys, tmp_path, family):
         config = config_file(tmp_path, mock, flight={"accept": accept})
         code, out, _ = doctor(capsys, "--config", config)
         assert code == 0
-        assert "excepted by flight.accept" in " ".join(out.split())
+        assert "accepted by flight.accept" in " ".join(out.split())
         undo["system"] = 7
         (tmp_path / "other.yaml").write_text(yaml.safe_dump(undo))
         code, _, err = doctor(capsys, "--config", config, "--undo", tmp_path / "other.yaml")

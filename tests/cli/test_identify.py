@@ -247,8 +247,8 @@ def test_an_axis_that_is_not_good_is_kept_from_the_flights_configuration(capsys,
     assert code == 0, err
     result = json.loads(out)
     assert result["kept"] == {
-        "yaw": "kept from the configuration (lag 370.0 ms, dead time 102.0 ms): too little "
-        "excitation: the commands span 0.03 rad/s, 0.20 are needed"
+        "yaw": "kept from the configuration (lag 370.0 ms, dead time 102.0 ms), because the "
+        "fit is bad: too little excitation: the commands span 0.03 rad/s, 0.20 are needed"
     }
     assert f"yaw: {result['kept']['yaw']}" in err
     vehicle = yaml.safe_load((tmp_path / "vehicle.yaml").read_text())["vehicle"]

@@ -73,7 +73,7 @@ def test_a_folder_gives_its_configuration_and_the_drag_that_was_learned(vehicle,
     code, told, _ = run(capsys, folder, "--no-flights")
     assert code == 0, told
     text = (folder / "tuned.yaml").read_text()
-    assert "# before 3; " in text
+    assert "# was 3; " in text
     assert load(folder / "tuned.yaml").guidance.drag_per_s == 0.7
 
 

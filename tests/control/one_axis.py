@@ -82,7 +82,7 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
             position = LocalPosition(time, at, (0.0, east, -5.0), (0.0, fast, 0.0))
             estimate.note_position(position, offboard_active=True)
         if n % _GUIDANCE == 0:
-            inputs = estimate.guidance_input(time, guidance.acts_after, (2.0, 18.0))
+            inputs = estimate.guidance_input(time, guidance.effect_delay, (2.0, 18.0))
             held = Reference((0.0, 0.0, -5.0))
             target, later, down = guidance.command(lambda _, held=held: held, time, inputs)
             command = GuidanceCommand(target, down, time, later_target=later, period=_GUIDANCE * DT)

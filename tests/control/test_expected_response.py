@@ -113,7 +113,7 @@ def test_the_words_about_a_response():
     assert found.sentence() == (
         "a step from -0.25 to 0.25 (±14° of tilt) is expected to have a time constant of 0.50 s; "
         "limits.max_tilt_rate_deg_s lengthens the time constant most (0.30 s without "
-        "limits.max_tilt_rate_deg_s, 0.40 s with twice planner.gain_per_s)"
+        "limits.max_tilt_rate_deg_s, 0.40 s with planner.gain_per_s doubled)"
     )
     assert not found.gain_is_too_high
     assert found.gain_sentence() == (

@@ -228,7 +228,7 @@ def test_a_command_that_is_not_finite_is_told_and_the_one_before_grows_old(east,
     assert not bench.guidance_loop.command_not_finite
     target, later = Target(0.0, 0.0, 0.0), Target(0.0, east, 0.0)
     bench.guidance_loop.command_maker.guidance = SimpleNamespace(
-        acts_after=0.1, command=lambda *_: LinearCommand(target, later, down)
+        effect_delay=0.1, command=lambda *_: LinearCommand(target, later, down)
     )
     assert bench.fly(IN_HOLD + 0.02) is before
     assert bench.guidance_loop.command_not_finite
@@ -266,7 +266,7 @@ def test_what_a_phase_tells_guidance():
 
 def test_a_guidance_loop_knows_nothing_before_its_first_step():
     guidance = Bench(begun=False).guidance_loop
-    with pytest.raises(RuntimeError, match="before any position came"):
+    with pytest.raises(RuntimeError, match="before any position had come"):
         guidance.hold_here()
     assert (guidance.motion, guidance.tracking_error, guidance.hold.give_up_reason) == (
         None,

@@ -9,7 +9,7 @@ from companion.attitude.history import PlannedTilt
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import Deadlines, UnansweredReason
-from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
+from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleWriter
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
 from companion.recording.trace import FlightTrace
@@ -34,7 +34,7 @@ ANSWER = Answer(
 
 def recorded(entry):
     kept = KeptMessages()
-    SampleRows(LIMITS, (0.1, 0.9)).sample(kept, 77, entry)
+    SampleWriter(LIMITS, (0.1, 0.9)).sample(kept, 77, entry)
     assert {time for rows in kept.messages.values() for time, _ in rows} == {77}
     return kept
 

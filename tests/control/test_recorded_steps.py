@@ -5,7 +5,7 @@ from math import isnan, sqrt
 from companion.attitude import BodyRates, Target
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.heading_frame import HeadingFrame
-from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepRows
+from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepWriter
 from companion.drag import Drag
 from companion.guidance import GuidanceInput, Reference, VehicleMotion
 from companion.recording.mcap_file import cdr
@@ -57,7 +57,7 @@ def columns(prefix, unit, values):
 
 
 def test_a_step_in_its_columns():
-    kept, rows = KeptMessages(), StepRows()
+    kept, rows = KeptMessages(), StepWriter()
     rows.step(kept, 88, StepEntry(READ, MADE, COMMAND))
     assert list(kept.messages) == ["/guidance_input", "/target", "/guidance"]
     assert {time for messages in kept.messages.values() for time, _ in messages} == {88}
@@ -126,7 +126,7 @@ def test_a_step_in_its_columns():
 
 
 def test_what_a_step_does_not_know_is_nan():
-    kept, rows = KeptMessages(), StepRows()
+    kept, rows = KeptMessages(), StepWriter()
     nothing = StepInput(20.0, None, None, None, None, None, None, READ.flags)
     rows.step(kept, 88, StepEntry(nothing, None, None))
     assert list(kept.messages) == ["/guidance_input"]
@@ -150,7 +150,7 @@ def test_what_a_step_does_not_know_is_nan():
 
 
 def test_each_second_step_draws_the_vehicle_and_its_reference_east_north_up():
-    kept, rows = KeptMessages(), StepRows()
+    kept, rows = KeptMessages(), StepWriter()
     for _ in range(4):
         rows.step(kept, 88, StepEntry(READ, MADE, COMMAND))
     w, x, y, z = Q

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from companion.attitude import BodyRates, Target
 from companion.control import scene_rows
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.scene_rows import SceneRows
+from companion.control.scene_rows import SceneWriter
 from companion.guidance import GRAVITY
 from tests.control.kept_messages import KeptMessages
 
@@ -23,7 +23,7 @@ STEP_NS = 100_000_000
 def drawn(monkeypatch):
     """Draws, and returns the entities of a topic: a list of tuples."""
     monkeypatch.setattr(scene_rows, "scene_message", lambda time_ns, entities: entities)
-    rows, kept = SceneRows(), KeptMessages()
+    rows, kept = SceneWriter(), KeptMessages()
 
     def draw(*, command=None, q=LEVEL, times=(0,), position=(1.0, 2.0, 3.0)):
         if command is not None:

@@ -34,7 +34,7 @@ class Steps:
     def step(self, now, reference, *, offboard_active=True):
         flags = StepFlags(True, False, False, offboard_active)
         output = StepOutput(
-            now - 6.0, (1.0, 0.0, 0.0, 0.0), SimpleNamespace(now=HERE), reference, None
+            now - 6.0, (1.0, 0.0, 0.0, 0.0), SimpleNamespace(present=HERE), reference, None
         )
         self.recorder.step(flags, now, output, None)
 

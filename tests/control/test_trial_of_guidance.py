@@ -22,8 +22,8 @@ GOOD = LinearCommand(Target(0.1, 0.2, 0.3), Target(0.4, 0.5, 0.6), -0.5)
 class Theirs:
     """Guidance that remembers what it was asked."""
 
-    def __init__(self, settings, command=GOOD, acts_after=0.1):
-        self.settings, self.acts_after, self._command = settings, acts_after, command
+    def __init__(self, settings, command=GOOD, effect_delay=0.1):
+        self.settings, self.effect_delay, self._command = settings, effect_delay, command
         self.asked = []
 
     def command(self, reference, now, inputs):
@@ -53,9 +53,9 @@ def made(monkeypatch):
 def test_the_trial_is_of_a_vehicle_at_rest_where_it_should_be(made):
     flown, (tried, other) = made()
     ((reference, now, inputs),) = tried.asked
-    assert reference.position_ned == inputs.now.position_ned == (0.0, 0.0, 0.0)
-    assert (reference.velocity_ned, inputs.now.velocity_ned) == ((0.0, 0.0, 0.0),) * 2
-    assert (now, inputs.predicted, inputs.drag) == (0.0, inputs.now, NO_DRAG)
+    assert reference.position_ned == inputs.present.position_ned == (0.0, 0.0, 0.0)
+    assert (reference.velocity_ned, inputs.present.velocity_ned) == ((0.0, 0.0, 0.0),) * 2
+    assert (now, inputs.predicted, inputs.drag) == (0.0, inputs.present, NO_DRAG)
     assert inputs.thrust == inputs.disturbance == (0.0, 0.0)
     assert inputs.thrust_limits == thrust_limits(CONFIG)
     assert other.asked == [], "the one that flies remembers no trial"
@@ -68,9 +68,9 @@ def test_the_trial_is_of_a_vehicle_at_rest_where_it_should_be(made):
     [
         GOOD._replace(target=Target(nan, 0.2, 0.3)),
         GOOD._replace(target=Target(0.1, 0.2, 0.3, nan)),
-        GOOD._replace(later=Target(0.4, inf, 0.6)),
-        GOOD._replace(down=-inf),
-        (GOOD.target, GOOD.later),
+        GOOD._replace(later_target=Target(0.4, inf, 0.6)),
+        GOOD._replace(acceleration_down=-inf),
+        (GOOD.target, GOOD.later_target),
         None,
         ArithmeticError("no"),
         SystemExit(3),
@@ -82,7 +82,7 @@ def test_what_does_not_command_finite_numbers_is_refused(made, command):
 
 
 def test_a_time_that_is_no_number_is_refused(made):
-    with pytest.raises(ConfigError, match=r"`acts_after` must be finite, .* and nan s"):
+    with pytest.raises(ConfigError, match=r"`effect_delay` must be finite, .* and nan s"):
         made(GOOD, nan)
 
 

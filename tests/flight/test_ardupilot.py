@@ -41,7 +41,7 @@ def test_the_maneuver_is_flown_and_the_vehicle_lands(flown):
     assert flown.result == "ok", flown.events
     assert flown.phase == "disarm"
     modes = [text for _, text in flown.events if text.startswith("mode ")]
-    assert modes[-4:] == ["mode GUIDED", "mode GUIDED by rates", "mode BRAKE", "mode LAND"]
+    assert modes[-4:] == ["mode GUIDED", "mode GUIDED (body rates)", "mode BRAKE", "mode LAND"]
     assert flown.events[-1][1] == "disarmed"
     assert any("last rates for 1 s (GUID_TIMEOUT)" in text for _, text in flown.events)
     assert commands(flown) == [SET_MODE, ARM, TAKE_OFF, SET_MODE, SET_MODE]

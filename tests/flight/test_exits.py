@@ -280,7 +280,7 @@ def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkey
         state = mock.state()
     assert summary.result == "guidance makes no commands any more"
     assert (state["mode"], state["armed"], state["crashed"]) == (ways.held, True, False)
-    words = {"px4": "mode OFFBOARD", "ardupilot": "mode GUIDED by rates"}[ways.autopilot]
+    words = {"px4": "mode OFFBOARD", "ardupilot": "mode GUIDED (body rates)"}[ways.autopilot]
     began = next(at for at, text in summary.events if text == words)
     assert setpoints(summary)[-1]._timestamp < began + 1.2 + 1.0 + 0.2
 

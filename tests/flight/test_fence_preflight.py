@@ -12,7 +12,7 @@ from companion.flight.fence_check import TRACKING_MARGIN, FenceCheck
 from companion.flight.maneuver_checks import require_inside
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose
-from companion.guidance.fence import Fence, Place, distance_inside
+from companion.guidance.fence import Fence, LatLon, distance_inside
 from companion.guidance.predicted import predict
 from companion.guidance.trajectory.demand import Motion
 from companion.safety.motion_breaches import braking
@@ -64,7 +64,7 @@ def test_a_line_that_ends_inside_but_could_not_stop_there_is_refused(tmp_path):
     told = refusal(following(tmp_path, LINE), limits={"fence_radius_m": 8.0})
     assert "braking would end up to 0." in told
     assert "limits.fence_radius_m" in told
-    assert "fly it more slowly (--slow-down" in told
+    assert "fly more slowly (for a trajectory, --slow-down" in told
     slow = merged(following(tmp_path, LINE), {"flight": {"slow_down": True}})
     (part,) = configured_maneuvers(config_of(slow, limits={"fence_radius_m": 8.01})).parts
     assert any("because of limits.fence_radius_m at" in note for note in part.notes)
@@ -98,7 +98,7 @@ def test_slowing_down_is_not_advised_where_it_does_not_help(tmp_path, text, limi
     way = merged(following(tmp_path, text), {"flight": {"slow_down": slow}})
     told = refusal(way, limits={"fence_radius_m": 8.0, **limits})
     assert words in told
-    assert told.endswith("shrink it or widen the fence")
+    assert told.endswith("make the path smaller, or widen the fence")
     assert "slow" not in told.removeprefix(way["flight"]["trajectory"])
 
 
@@ -127,7 +127,7 @@ def test_a_polygon_is_judged_all_along_the_way(tmp_path, to, corners, words):
 
 
 def test_a_polygon_on_the_map_is_judged_as_soon_as_the_place_is_known():
-    here = Place(47.0, 8.0)
+    here = LatLon(47.0, 8.0)
     side = 10.0 / 111_195.0
     corners = [[47.0 - side, 7.9999], [47.0 + side, 7.9999], [47.0 + side, 8.0001]]
     corners.append([47.0 - side, 8.0001])

@@ -83,7 +83,7 @@ def test_the_solvers_death_is_reported_and_costs_little(tmp_path):
     summary = flown(tmp_path, "figure8.yaml", kill)
     (told,) = [text for _, text in summary.events if "predictive" in text]
     assert "ended by signal 9" in told
-    assert "linear guidance flies on" in told
+    assert "linear guidance continues the flight" in told
     assert summary.as_dict()["nmpc"]["troubles"] == {"died": 1}
     assert 200 < summary.as_dict()["nmpc"]["flown"] < 500
     assert summary.tracking()["position_max_m"] <= 0.3
@@ -132,7 +132,7 @@ def command(predictive, vehicle, following):
     target, down = LINEAR
     linear = LinearCommand(target, target, down)
     flown = predictive.replacement_for(linear, HeadingFrame(), vehicle, following)
-    return flown.target, flown.down
+    return flown.target, flown.acceleration_down
 
 
 LAPS = Laps(2.0)
@@ -169,8 +169,10 @@ def test_it_works_in_the_estimators_frame_with_the_heading_resets():
     assert flown == (10.0, 0.1, 0.2, pytest.approx(0.8), pytest.approx(thrust))
     solver.answer = answer(1, 10.02)
     command = predictive.replacement_for(linear, frame, vehicle(10.02), following)
-    assert command.target == command.later == Target(0.3, 0.4, pytest.approx(-0.4))
-    assert command.down == pytest.approx(GRAVITY - 12.0 * (1.0 - 0.3**2 - 0.4**2) ** 0.5)
+    assert command.target == command.later_target == Target(0.3, 0.4, pytest.approx(-0.4))
+    assert command.acceleration_down == pytest.approx(
+        GRAVITY - 12.0 * (1.0 - 0.3**2 - 0.4**2) ** 0.5
+    )
     turning = where(0.04, Laps(2.0, face_path=True))  # its headings are not relative to the pose's
     predictive.replacement_for(linear, frame, vehicle(10.04), turning)
     assert solver.requests[-1].start == Start((0.0, 0.0, -5.0), 0.5)
@@ -198,5 +200,5 @@ def test_each_kind_of_trouble_is_told_once_and_all_are_counted():
         solver.report(Trouble.LATE, "request 6 took 31.0 ms")
     solver.report(Trouble.IMPLAUSIBLE, "the answer to request 9 has a thrust of 99.00 m/s²")
     assert len(notes) == 2
-    assert "took 31.0 ms; linear guidance flies on" in notes[0]
+    assert "took 31.0 ms; linear guidance continues the flight" in notes[0]
     assert predictive.record.troubles == {Trouble.LATE: 3, Trouble.IMPLAUSIBLE: 1}

@@ -63,7 +63,7 @@ def test_a_trajectory_is_judged_by_what_was_learned(tmp_path):
         update={"guidance": config.guidance.model_copy(update={"drag_per_s": 0.2})}
     )
     configured_maneuvers(told)
-    with pytest.raises(ConfigError, match=r"not known: assumed up to 0.7 1/s"):
+    with pytest.raises(ConfigError, match=r"not known; up to 0.7 1/s is assumed"):
         configured_maneuvers(
             parse(
                 bounded_yaml.dump(
@@ -91,7 +91,7 @@ def test_another_vehicles_drag_counts_only_until_this_one_is_known(tmp_path):
     with mock_vehicle(tmp_path, seed=3) as mock:
         flown = fly(mock, tmp_path / "log", **steep)
     assert flown.phase == "checks"
-    assert "the drag is not known: assumed up to 0.7 1/s" in flown.result
+    assert "the vehicle's drag is not known; up to 0.7 1/s is assumed" in flown.result
 
 
 def test_it_is_the_vehicles_own(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from companion.guidance.fence import (
     EARTH_RADIUS,
     Fence,
-    Place,
+    LatLon,
     distance_inside,
     inside,
     local_polygon,
@@ -17,7 +17,7 @@ from companion.guidance.fence import (
 
 SQUARE = ((-10.0, -10.0), (-10.0, 10.0), (10.0, 10.0), (10.0, -10.0))
 FENCE = Fence(50.0, 30.0, 2.0, (), (), 2.0, 0.5)
-HOME = Place(47.0, 8.0)
+HOME = LatLon(47.0, 8.0)
 
 
 def breach(north=0.0, east=0.0, down=0.0, height=10.0, fence=FENCE, **options):
@@ -89,7 +89,7 @@ def test_a_fence_on_the_map_needs_to_know_where_it_is():
         (47.0 + north / degree, 8.0 + east / (degree * cos(radians(47.0))))
         for north, east in SQUARE
     )
-    fence = replace(FENCE, places=corners)
+    fence = replace(FENCE, polygon_deg=corners)
     assert breach(9.9, -9.9, fence=fence) is None
     assert breach(9.9, -10.1, fence=fence).limit == "safety.fence_polygon_deg"
     unknown = breach(fence=fence, origin=None)
@@ -107,7 +107,7 @@ def test_a_fence_on_the_map_needs_to_know_where_it_is():
 @pytest.mark.parametrize("origin", [180.0, -180.0, 179.99999, -179.99999])
 def test_a_fence_on_the_map_may_lie_across_the_date_line(origin):
     """Fiji: some corners have positive longitudes, the others negative ones."""
-    home = Place(-17.0, origin)
+    home = LatLon(-17.0, origin)
     degree = EARTH_RADIUS * radians(1.0)
     corners = tuple(
         (
@@ -119,7 +119,7 @@ def test_a_fence_on_the_map_may_lie_across_the_date_line(origin):
     assert {longitude > 0.0 for _, longitude in corners} == {True, False}
     flat = [value for corner in local_polygon(corners, home) for value in corner]
     assert flat == pytest.approx([value for corner in SQUARE for value in corner], abs=1e-5)
-    fence = replace(FENCE, places=corners)
+    fence = replace(FENCE, polygon_deg=corners)
     assert breach(9.9, -9.9, fence=fence, origin=home) is None
     assert breach(9.9, -10.1, fence=fence, origin=home).limit == "safety.fence_polygon_deg"
 

@@ -72,7 +72,7 @@ def flown(settings, reference_at, seconds, wind=REST, start=None, has=ROUND_BODY
         t = n * DT
         thrust = GRAVITY * c / math.sqrt(1.0 - c @ c)
         motion = VehicleMotion(tuple(p), tuple(v))
-        ahead = guidance.acts_after
+        ahead = guidance.effect_delay
         known = np.array([*thrust, 0.0]) + DRAG.linear * (wind - v)
         known[:2] -= has.deceleration(v[0], v[1])
         acts = VehicleMotion(
@@ -176,7 +176,9 @@ def test_thrust_balances_the_drag_of_climb_and_descent_where_the_height_is_held(
     situation = GuidanceInput(motion, motion, (0.0, 0.0), (0.0, 0.0), drag, THRUST)
 
     def down(reference):
-        return LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation).down
+        return (
+            LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation).acceleration_down
+        )
 
     assert down(reference) == pytest.approx((0.8 + 0.1 * math.hypot(3.0, climb)) * climb)
     assert down(reference._replace(vertical=VerticalMode.ACCELERATION)) == 0.0

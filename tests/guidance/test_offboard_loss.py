@@ -23,17 +23,17 @@ def test_a_vehicle_that_hovers_is_carried_no_farther_than_feedback_had_turned_it
     there = reach(flown(), PX4._replace(hold_time=0.0))
     assert there.largest_distance < 0.1
     assert max(there.max_climb, there.max_fall) < 0.1
-    assert hypot(*there.place) == 0.0
+    assert hypot(*there.stop_position) == 0.0
     assert reach(flown(), PX4).largest_distance < 2.0
 
 
 def test_level_at_a_speed_it_goes_on_for_the_time_and_then_brakes_as_the_fence_reckons():
     """A fraction over, for feedback."""
     there = reach(flown(velocity=(5.0, 0.0, 0.0)), PX4)
-    assert there.place == pytest.approx(
+    assert there.stop_position == pytest.approx(
         (5.0 * 1.1 + FENCE.stopping_point(NOTHING, (5.0, 0.0, 0.0))[0], 0.0)
     )
-    assert there.largest_distance == pytest.approx(there.place[0] + there.stop_radius)
+    assert there.largest_distance == pytest.approx(there.stop_position[0] + there.stop_radius)
     assert 0.0 < there.stop_radius < 5.0
 
 
@@ -47,7 +47,7 @@ def test_without_feedback_height_and_drift_are_what_one_reckons_by_hand():
     assert falling.max_fall == pytest.approx(3.0 * 1.1 + 3.0 * 0.1 + 3.0**2 / 8.0)
     assert falling.max_climb == 0.0
     drifting = reach(flown(velocity=(-5.0, 0.0, 0.0)), steady._replace(brakes=False))
-    assert drifting.place == pytest.approx((-5.0 * 1.1 - 5.0 * 0.1 - 5.0 / 0.2, 0.0))
+    assert drifting.stop_position == pytest.approx((-5.0 * 1.1 - 5.0 * 0.1 - 5.0 / 0.2, 0.0))
     assert drifting.stop_radius == pytest.approx(0.0, abs=1e-9)
 
 
@@ -79,17 +79,19 @@ def test_an_autopilot_that_does_not_hold_lets_it_drift_until_drag_has_stopped_it
     slippery, dragged = (
         reach(east, ARDUPILOT._replace(drag=drag)) for drag in (NO_DRAG, Drag(0.5))
     )
-    assert slippery.place[1] > 5.5 + 5.0 / 0.2  # unknown drag: the least that any vehicle has
-    assert 5.0 / 0.5 < dragged.place[1] < 0.6 * slippery.place[1]
+    assert (
+        slippery.stop_position[1] > 5.5 + 5.0 / 0.2
+    )  # unknown drag: the least that any vehicle has
+    assert 5.0 / 0.5 < dragged.stop_position[1] < 0.6 * slippery.stop_position[1]
 
 
 def test_rates_that_are_held_turn_the_thrust_and_the_longer_the_worse():
     rolling = flown(turn=(0.5 * GRAVITY, 0.0, 0.0))  # 0.5 rad/s northwards from level
     short, long = (reach(rolling, PX4._replace(hold_time=held)) for held in (0.5, 1.5))
-    assert 0.0 < short.place[0] < long.place[0] / 5.0
+    assert 0.0 < short.stop_position[0] < long.stop_position[0] / 5.0
     assert short.max_fall < long.max_fall
     slower = reach(rolling, PX4._replace(hold_time=1.5, max_tilt_rate=0.2))
-    assert slower.place[0] < 0.5 * long.place[0]
+    assert slower.stop_position[0] < 0.5 * long.stop_position[0]
     assert slower.max_fall < long.max_fall
 
 
@@ -116,7 +118,7 @@ def test_however_strong_the_drag_and_long_the_hold_it_only_slows(drag, thrust):
     """A step of the integration is longer than the drag's time constant; thrust may be nothing."""
     failsafe = ARDUPILOT._replace(hold_time=10.0, drag=drag)
     there = reach(flown(velocity=(20.0, 0.0, 0.0), thrust=thrust, turn=(0.0, 0.0, 1.0)), failsafe)
-    assert 0.0 < there.place[0] < 20.0 * 10.1
+    assert 0.0 < there.stop_position[0] < 20.0 * 10.1
     assert 0.0 <= there.stop_radius < inf
     assert 0.0 <= there.max_fall < 3000.0  # it falls without thrust for 12 s
 

@@ -270,7 +270,7 @@ def test_the_table_tells_what_is_bad_or_missing():
     text = shown(nothing)
     assert text.count("bad") == 3
     assert "thrust: not measured, or never changed" in text
-    assert "explains 47%" in shown(replace(VEHICLE, thrust=POOR_MAP))
+    assert "explains only 47%" in shown(replace(VEHICLE, thrust=POOR_MAP))
 
 
 def test_a_vehicle_is_identified_axis_by_axis_for_a_gain_of_one():

@@ -174,7 +174,7 @@ def test_times_that_do_not_meet_are_named_as_the_reason():
     commanded = np.sign(np.sin(2.0 * time))
     for scale, shift in ((1.0, 1000.0), (1000.0, 0.0)):  # another clock; ms
         found = fit_rate_response(scale * time, commanded, scale * time + shift, commanded)
-        assert "both need times in s on one clock" in found.flaw()
+        assert "rates need times in s on one clock" in found.flaw()
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def test_the_flown_vehicles_drag_replaces_that_of_the_vehicle_that_flew_last(tmp
     less_tilt = {"limits": {"max_tilt_deg": 30.0}}
     checks.check(less_tilt, "a test")
     checks.note_drag({"drag": None, "source": None})
-    with pytest.raises(ConfigError, match=r"not known: assumed up to 0\.7 1/s"):
+    with pytest.raises(ConfigError, match=r"not known; up to 0\.7 1/s is assumed"):
         checks.check(less_tilt, "a test")
     checks.note_drag({"drag": [0.3, 0.0], "source": "learned-bb.json"})
     checks.check(less_tilt, "a test")

@@ -86,7 +86,9 @@ async def test_a_flight_that_has_ended_and_one_that_does_not_read_refuse_in_diff
         asyncio.get_running_loop().remove_reader(flight.end.fileno())
         for _ in range(5000):
             connection.note("x" * 500)
-        with pytest.raises(ChangeRefusedError, match="is too busy to take it; nothing has changed"):
+        with pytest.raises(
+            ChangeRefusedError, match="is too busy to take the change; nothing has changed"
+        ):
             await connection.undo("a test")
         flight.end.close()
         await connection.flight_ended.wait()

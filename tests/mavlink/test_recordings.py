@@ -23,7 +23,7 @@ STORIES = {  # (s since the beginning of the whole log, mode, armed) at each cha
         (0.97, "STABILIZE", False),
         (43.2, "GUIDED", False),
         (44.99, "GUIDED", True),
-        (56.99, "GUIDED by rates", True),
+        (56.99, "GUIDED (body rates)", True),
         (74.63, "LAND", True),
         (99.99, "LAND", False),
     ],

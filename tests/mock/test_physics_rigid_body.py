@@ -8,10 +8,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.physics.rigid_body import NO_AXIS_DRAG, Body, advance, body_of, derivative
+from sitl_mock.physics.rigid_body import NO_AXIS_DRAG, RigidBody, advance, body_of, derivative
 from sitl_mock.settings import MockSettings
 
-FREE = Body(
+FREE = RigidBody(
     0.02, 0.035, 0.05, 0.0, 0.0, NO_AXIS_DRAG, NO_AXIS_DRAG, rotational_drag=0.0, gravity=9.80665
 )
 REAL = body_of(

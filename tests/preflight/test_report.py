@@ -38,8 +38,8 @@ def test_without_anything_unsafe_the_summary_says_that_it_may_be_flown() -> None
     assert shown([FINE, WEAK])[-1] == "nothing unsafe was found; 1 ineffective, see above"
 
 
-def test_an_excepted_finding_says_so() -> None:
+def test_an_accepted_finding_says_so() -> None:
     accepted = changed(Config(), {"flight": {"accept": [str(BAD.key)]}}, "test")
     lines = shown([BAD], accepted)
-    assert "  Excepted by flight.accept" in lines
-    assert lines[-1] == "1 unsafe, each excepted by flight.accept"
+    assert "  Accepted by flight.accept" in lines
+    assert lines[-1] == "1 unsafe, each accepted by flight.accept"

@@ -46,4 +46,4 @@ def mode_name(autopilot: str, told: Told) -> str:
         return next((name for name, each in PX4_MODES.items() if each == key), str(key))
     name = next((name for name, each in ARDUPILOT_MODES.items() if each == mode), str(mode))
     by_rates = name == "GUIDED" and told.armed and not told.base_mode & 8
-    return "GUIDED by rates" if by_rates else name
+    return "GUIDED (body rates)" if by_rates else name

@@ -135,7 +135,7 @@ class Station:
 
     @property
     def obeys(self) -> bool:
-        return self.armed and self.mode in ("OFFBOARD", "GUIDED by rates")
+        return self.armed and self.mode in ("OFFBOARD", "GUIDED (body rates)")
 
     @property
     def seen(self) -> list[Seen]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.attitude import BodyRates, Limits
-from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
+from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleWriter
 from companion.recording import background_file, series
 from companion.recording.background_file import BackgroundFile
 from companion.recording.flight_record import read_flight
@@ -19,7 +19,7 @@ def test_numpy_rates_are_recorded_and_a_bad_entry_costs_itself_alone(tmp_path):
     recorder = FlightRecorder(
         tmp_path / "flight.mcap", 0.0, lambda: 1.0, failures.append, bad.append
     )
-    rows = SampleRows(Limits(np.float64(1.0), np.float64(0.5)), (0.1, 0.9))
+    rows = SampleWriter(Limits(np.float64(1.0), np.float64(0.5)), (0.1, 0.9))
     q = (1.0, 0.0, 0.0, 0.0)
     sample = AttitudeSample(7, 0.007, 1.0, 0, q, BodyRates(0.0, 0.0, 0.0), 0.01, None, True)
     flags = LoopFlags(True, True, True, False, True)

@@ -88,7 +88,7 @@ def words(figures, called=DEMO):
 
 def test_a_good_flight_is_called_good_with_its_figures_and_limits():
     told, text = words(GOOD)
-    assert (told.good, told.completed) == (True, True)
+    assert (told.was_good, told.completed) == (True, True)
     alone = words({**GOOD, "maneuvers": [CIRCLE]})[0]
     assert alone.headline == "The flight was good: circle, every figure within its limit."
     assert told.headline == (
@@ -121,7 +121,7 @@ BEYOND = {
 def test_each_figure_beyond_its_limit_is_told_first_with_what_to_do(what):
     path, value, remedy = BEYOND[what]
     told, _ = words(changed(path, value))
-    assert (told.good, told.completed) == (False, True)
+    assert (told.was_good, told.completed) == (False, True)
     assert "not good" in told.headline
     assert "1 of 11 figures beyond their limits" in told.headline
     assert told.lines[0].startswith(f"! {what}: ")
@@ -151,7 +151,7 @@ SWING = {"swing_rms_deg": 11.9, "swing_period_s": 0.43, "swing_regularity": 0.92
 
 def test_a_hover_that_swings_is_not_good_and_wind_is_no_swing():
     told, _ = words(changed(["maneuvers", 0], {**HOVER, **SWING}))
-    assert (told.good, told.lines[0][:56]) == (
+    assert (told.was_good, told.lines[0][:56]) == (
         False,
         "! hover: swings by 11.9° RMS every 0.43 s (limit 3°); lo",
     )
@@ -165,18 +165,18 @@ def test_a_hover_that_swings_is_not_good_and_wind_is_no_swing():
 def test_a_gain_above_the_sensible_one_is_told_after_good_and_bad_flights():
     figures = {**GOOD, "gain_warning": "planner.gain_per_s is 10, and 5.2 is …"}
     told, _ = words(figures)
-    assert (told.good, told.lines[0]) == (True, "! planner.gain_per_s is 10, and 5.2 is …")
+    assert (told.was_good, told.lines[0]) == (True, "! planner.gain_per_s is 10, and 5.2 is …")
     assert words({**figures, **ENDED})[0].lines[-1] == told.lines[0]
 
 
 def test_a_drag_that_the_next_flight_begins_with_makes_no_flight_bad_and_is_flown_again():
     figures = {**GOOD, "drag_learned": "the vehicle's drag at 5.1 m/s is 1.00 1/s; …"}
     told, text = words(figures)
-    assert (told.good, told.next_command) == (True, "companion plot flights/one")
+    assert (told.was_good, told.next_command) == (True, "companion plot flights/one")
     assert "  the vehicle's drag at 5.1 m/s is 1.00 1/s; …" in text
     off_course = changed(["maneuvers", 2, "level_rms_m"], 0.26, figures)
     told, text = words(off_course)
-    assert (told.good, told.next_command) == (False, "companion demo --lockstep")
+    assert (told.was_good, told.next_command) == (False, "companion demo --lockstep")
     assert (
         "fly again: the next flight begins with the drag that this flight learned" in told.lines[0]
     )
@@ -187,7 +187,7 @@ def test_a_drag_that_the_next_flight_begins_with_makes_no_flight_bad_and_is_flow
 def test_a_step_that_the_tilt_limit_cut_is_told_with_the_tilt_it_asked_for():
     cut = changed(["response", "asked_tilt_deg"], 42.46, {**GOOD, "max_tilt_deg": 35.0})
     told, text = words(cut)
-    assert (told.good, text.count("tilt limit")) == (False, 1)
+    assert (told.was_good, text.count("tilt limit")) == (False, 1)
     assert told.lines[0] == (
         "! tilt of the steps: the tilt limit cut a step, which asked for 42.5° "
         "(limits.max_tilt_deg: 35); lower steps.coefficient or the corners' coefficients, fly in "
@@ -237,14 +237,14 @@ def test_a_full_disk_is_not_blamed_on_the_configuration():
     assert told.headline == (
         "The flight was good, as far as it could be recorded: hover, steps and circle."
     )
-    assert (told.good, told.lines[0]) == (False, f"! {sentence}")
+    assert (told.was_good, told.lines[0]) == (False, f"! {sentence}")
     assert told.lines[-1].startswith("  at least 38 s under our control"), "the rest was lost"
     assert words(GOOD)[0].lines[-1].startswith("  38 s under our control")
 
 
 def test_a_flight_that_ended_early_says_when_why_and_what_to_do():
     told, text = words({**GOOD, **ENDED})
-    assert (told.good, told.completed) == (False, False)
+    assert (told.was_good, told.completed) == (False, False)
     assert told.headline == "The flight ended early: the vehicle is 9.1 m away."
     assert "when: at 33.9 s, in phase `maneuvers`, 7.2 s into circle" in text
     assert "vehicle now: disarmed, in mode AUTO.LOITER" in text

@@ -109,7 +109,7 @@ def test_each_maneuver_has_its_row():
         trace.tracking.add([10.0 + 0.1 * k, math.nan, math.nan, -5.0, 0.02 * k, 0.0, -5.01])
     lines = table(trace)
     assert cells(lines, "hover") == ["0.05 m", "0.05 m", "0.02 m", "0.02 m"]
-    assert cells(lines, "steps") == ["open loop", "1.98 m away", "0.01 m", "0.01 m"]
+    assert cells(lines, "steps") == ["open loop", "1.98 m of drift", "0.01 m", "0.01 m"]
 
 
 def test_in_lockstep_no_latency_and_no_deadline_is_shown():
@@ -147,6 +147,6 @@ def test_predictive_control_is_counted_with_what_it_left_to_linear_guidance():
 
     assert told(PredictiveFigures(3, {"late": 2, "failed": 1}, (0.001, 0.002, 0.009))) == (
         "predictive control: 3 answers flown, computed in 2.0 ms (p99 8.9 ms); linear guidance "
-        "replaced 3 others: 2 late, 1 failed"
+        "replaced 3 other answers: 2 late, 1 failed"
     )
     assert told(PredictiveFigures(0, {}, ())) == "predictive control: 0 answers flown"

@@ -19,7 +19,7 @@ def frame(number):
 
 def test_pymavlink_reads_back_every_frame_and_its_time(tmp_path):
     path = tmp_path / "flight.tlog"
-    with TlogWriter(path, epoch=1.7e9) as tlog:
+    with TlogWriter(path, clock_epoch=1.7e9) as tlog:
         for k in range(300):
             tlog(0.25 * k, bytes(frame(k % 256)))
     log = mavutil.mavlink_connection(str(path))

@@ -6,7 +6,7 @@ import pytest
 
 from companion.config import Config
 from companion.control.loop_record import UnansweredReason
-from companion.guidance.fence import Fence, Place
+from companion.guidance.fence import Fence, LatLon
 from companion.safety import (
     Action,
     SafetyLadder,
@@ -120,7 +120,8 @@ SAID = [
     (
         lambda: autopilot_breaches.any_estimator_reset,
         at(resets=Resets(1, 0.5, 0.3)),
-        "the estimator was reset: 0.5 m and 17° of heading in total; the references moved as much",
+        "the estimator was reset: 0.5 m and 17° of heading in total; the references were moved by "
+        "the same amount",
     ),
     (
         lambda: autopilot_breaches.battery(0.2),
@@ -172,8 +173,8 @@ SAID = [
         "one that this program did not send (ATTITUDE_TARGET)",
     ),
     (
-        lambda: link_breaches.frozen,
-        at(health=Health(frozen="ATTITUDE_QUATERNION repeats one attitude")),
+        lambda: link_breaches.frozen_telemetry,
+        at(health=Health(frozen_telemetry="ATTITUDE_QUATERNION repeats one attitude")),
         "frozen telemetry: ATTITUDE_QUATERNION repeats one attitude",
     ),
     (
@@ -281,7 +282,7 @@ def test_it_brakes_in_time_before_a_fence_on_the_map():
     corners = ((46.999, 7.999), (46.999, 8.001), (47.001, 8.001), (47.001, 7.999))  # 111 m north
     check = braking(Fence(inf, inf, -inf, (), corners, 2.0, 0.5))
     moving = Motion(
-        offset=(80.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), height=20.0, origin=Place(47.0, 8.0)
+        offset=(80.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), height=20.0, origin=LatLon(47.0, 8.0)
     )
     assert check(at(motion=moving), False) is None  # stops 2 m on
     fast = moving._replace(velocity=(12.0, 0.0, 0.0))  # stops 42 m on

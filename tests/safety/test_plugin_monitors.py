@@ -183,7 +183,7 @@ def test_a_judge_that_raises_is_asked_once_and_stops_no_other_monitor():
         10.0, AutopilotStatus(armed=False), Motion((0.0, 1.0, 0.0, 0.0), height=9.0)
     )  # upside down and disarmed
     ladder.step(rolled)
-    assert {"high (its fault)", "disarmed"} <= set(ladder.raised_alarms)
+    assert {"high (error)", "disarmed"} <= set(ladder.raised_alarms)
     ladder.step(rolled._replace(now=10.5))
     assert "tilt" in ladder.raised_alarms
 
@@ -198,9 +198,9 @@ def test_a_judge_that_is_always_slow_is_named_in_a_warning(monkeypatch):
     for step in range(60):  # of 20 ms; every fifth answer is quick at first
         taken = 0.001 if step < 30 and step % 5 == 0 else 0.015
         ladder.step(Snapshot(10.0 + 0.02 * step))
-        assert ("slow (its time)" in ladder.raised_alarms) is (step >= 51)
+        assert ("slow (too slow)" in ladder.raised_alarms) is (step >= 51)
     assert notes[-1] == (
-        "safety: slow (its time): this monitor takes 15 ms, and delays the setpoints → warn"
+        "safety: slow (too slow): this monitor takes 15 ms, and delays the setpoints → warn"
     )
 
 
@@ -210,8 +210,8 @@ def test_a_judge_that_raised_is_not_called_slow(monkeypatch):
     ladder = SafetyLadder(monitors(configured("high")), 3.0)
     for step in range(60):
         ladder.step(Snapshot(10.0 + 0.02 * step, motion=Motion(height=9.0)))
-    assert "high (its fault)" in ladder.raised_alarms
-    assert "high (its time)" not in ladder.raised_alarms
+    assert "high (error)" in ladder.raised_alarms
+    assert "high (too slow)" not in ladder.raised_alarms
 
 
 def test_it_can_only_choose_among_the_actions():

@@ -7,7 +7,7 @@ import pytest
 
 from companion.config import Config
 from companion.control.loop_record import LoopRecord, UnansweredReason
-from companion.guidance.fence import Place, inside, local_polygon
+from companion.guidance.fence import LatLon, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.actions import StreamEffect
 from companion.safety.counter_window import CounterWindow
@@ -35,7 +35,7 @@ FINE = Snapshot(
         estimator=EstimatorStatus(inf, GOOD),
     ),
     Motion(
-        LEVEL, (0.1, 0.0, 0.0), (1.0, 2.0, -1.0), (1.0, 1.0, 0.0), 6.0, 0.2, 0.5, Place(47.0, 8.0)
+        LEVEL, (0.1, 0.0, 0.0), (1.0, 2.0, -1.0), (1.0, 1.0, 0.0), 6.0, 0.2, 0.5, LatLon(47.0, 8.0)
     ),
     Control(),
     Health(0.01, 0.02, 0.01, 0.01),
@@ -109,7 +109,13 @@ BREACHES = [
     ("silence", unanswered(UnansweredReason.AWAITING_MODE), HAND_BACK, 0.0, "did not confirm"),
     ("silence", unanswered(UnansweredReason.INVALID_ATTITUDE), HAND_BACK, 0.0, "cannot be used"),
     ("silence", unanswered(UnansweredReason.NOT_SENT), HAND_BACK, 0.0, "cannot be sent"),
-    ("frozen", health(frozen="it repeats"), HAND_BACK, 0.0, "frozen telemetry: it repeats"),
+    (
+        "frozen",
+        health(frozen_telemetry="it repeats"),
+        HAND_BACK,
+        0.0,
+        "frozen telemetry: it repeats",
+    ),
     ("clock", control(clock_change="the vehicle's clock jumped"), HAND_BACK, 0.0, "jumped"),
     ("disarmed", autopilot(armed=False), RELEASE, 0.0, "disarmed in flight"),
     ("landed", autopilot(landed=True), LAND, 0.0, "landed"),
@@ -367,7 +373,7 @@ def test_the_polygon_is_judged_about_where_control_began_or_on_the_map():
     degree = 111_194.9  # m of latitude
     map_corners = [(47.0 + n / degree, 8.0 + e / degree / cos(radians(47.0))) for n, e in L_SHAPE]
     flat = [
-        value for corner in local_polygon(tuple(map_corners), Place(47.0, 8.0)) for value in corner
+        value for corner in local_polygon(tuple(map_corners), LatLon(47.0, 8.0)) for value in corner
     ]
     assert flat == pytest.approx([value for corner in L_SHAPE for value in corner], abs=0.01)
     on_map = Config.model_validate({"safety": {"fence_polygon_deg": map_corners}})

@@ -9,7 +9,7 @@ import pytest
 from companion.attitude import BodyRates
 from companion.control.heading_frame import HeadingFrame
 from companion.control.loop_record import LoopRecord, UnansweredReason
-from companion.guidance.fence import FenceCentre, Place
+from companion.guidance.fence import FenceCentre, LatLon
 from companion.safety.snapshot import AutopilotStatus, Health, Motion, Resets
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.records import LocalPosition
@@ -123,7 +123,7 @@ def test_motion_is_seen_from_where_control_began(flight):
         height=12.5,
         tracking_error=0.9,
         thrust=0.45,
-        origin=Place(47.0, 8.0),
+        origin=LatLon(47.0, 8.0),
         acceleration=(0.3, -0.4),
         wind=(0.5, -0.6),
         moves_to_hold=True,
@@ -131,10 +131,10 @@ def test_motion_is_seen_from_where_control_began(flight):
 
 
 def test_the_fence_may_have_another_centre_than_where_control_began(flight):
-    flight.builder.begin(10.0, FenceCentre((4.0, 5.0, -6.0), Place(46.0, 7.0)))
-    assert flight.builder.fence_centre_without_resets().place == Place(46.0, 7.0)
+    flight.builder.begin(10.0, FenceCentre((4.0, 5.0, -6.0), LatLon(46.0, 7.0)))
+    assert flight.builder.fence_centre_without_resets().lat_lon == LatLon(46.0, 7.0)
     flight.listen(10.0)
-    assert flight.snapshot().motion.origin == Place(46.0, 7.0)
+    assert flight.snapshot().motion.origin == LatLon(46.0, 7.0)
 
 
 @pytest.mark.parametrize("command", [None, SimpleNamespace(idle=True)])

@@ -46,7 +46,7 @@ def test_a_process_that_cannot_be_killed_is_not_waited_for(tmp_path, monkeypatch
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: [hung, left][len(told)])
     told.append(pages.write(tmp_path))
     told.append(pages.write(tmp_path))
-    assert told[0].startswith("No report: it was not written within 0 s; ")
+    assert told[0].startswith("No report: the page was not written within 0 s; ")
     assert told[1].startswith("No report: interrupted; ")
     assert hung.killed >= 1
     assert left.killed >= 1

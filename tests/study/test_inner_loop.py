@@ -205,9 +205,9 @@ def test_the_same_flight_twice_is_the_same_to_the_last_bit():
 
 
 def test_the_rate_loop_takes_a_tenth_of_a_second_as_measured_on_px4():
-    assert InnerLoop().rate_time_63() == pytest.approx(0.10, abs=0.006)
-    assert InnerLoop(transport_delay=0.02).rate_time_63() == pytest.approx(
-        InnerLoop().rate_time_63() + 0.02, abs=1e-6
+    assert InnerLoop().rate_time_to_63_percent() == pytest.approx(0.10, abs=0.006)
+    assert InnerLoop(transport_delay=0.02).rate_time_to_63_percent() == pytest.approx(
+        InnerLoop().rate_time_to_63_percent() + 0.02, abs=1e-6
     )
 
 
@@ -215,7 +215,7 @@ def test_a_loop_of_one_lag_takes_its_time_constant():
     """P alone on a body with hardly any lag below: inertia over gain, closed form."""
     airframe = AirframeConfig(physics_rate_hz=10000, rotational_drag_n_m_s=0.0, rotor_lag_ms=0.05)
     loop = InnerLoop(airframe, every_axis(proportional_n_m_s=0.25))
-    assert loop.rate_time_63() == pytest.approx(0.025 / 0.25, rel=2e-3)
+    assert loop.rate_time_to_63_percent() == pytest.approx(0.025 / 0.25, rel=2e-3)
 
 
 def test_a_start_that_is_no_attitude_is_refused():

@@ -203,7 +203,9 @@ QUICK = timing.ProcessTimes(np.full(99, 5.0), np.full(99, 4.0), 0)
     ],
 )
 def test_a_verdict_is_made_of_the_numbers(words, flown, counts, timed, holds):
-    (finding,) = [one for one in findings.find(flown, counts, timed) if words in one.statement]
+    (finding,) = [
+        one for one in findings.make_findings(flown, counts, timed) if words in one.statement
+    ]
     assert finding.holds is holds
 
 

@@ -22,7 +22,7 @@ from companion.config.files import shipped
 from companion.files.yaml_file import ConfigError
 from companion.study import report
 from companion.study.track import flights, study
-from companion.study.track.findings import find
+from companion.study.track.findings import make_findings
 from companion.study.track.flights import PositionError, TrackedFlight
 from companion.study.track.tasks import WINDY, Task, TrajectoryAtSpeed, tasks
 
@@ -88,7 +88,7 @@ def test_the_truth_is_that_of_the_vehicle_at_the_same_time(vehicle):
 def test_each_flight_is_told_as_it_begins(flown):
     assert flown[1] == [
         "figure-eight, 4 m/s, model-following",
-        "figure-eight, 4 m/s, model-following, not led",
+        "figure-eight, 4 m/s, model-following, without lead",
         "figure-eight, 4 m/s, model-following in 3 m/s of wind",
     ]
 
@@ -190,19 +190,19 @@ def test_json_prints_one_list_and_the_tables_hold_what_was_flown(tmp_path, monke
 
 def test_the_findings_follow_from_the_numbers():
     def verdicts(**others):
-        return [finding.holds for finding in find(made_up(**others))]
+        return [finding.holds for finding in make_findings(made_up(**others))]
 
     assert verdicts() == [True] * 6
     assert verdicts(**{"circle, 3 m/s, model-following": 0.0231})[:2] == [True, True]  # even
     assert verdicts(**{"circle, 3 m/s, model-following": 0.0233})[:2] == [False, False]
     windy = "figure-eight, 1 m/s, model-following in 3 m/s of wind"
     assert verdicts(**{windy: 0.2}) == [True, True, False, True, True, True]
-    calm = "circle, 5 m/s, model-following, not led"
+    calm = "circle, 5 m/s, model-following, without lead"
     assert verdicts(**{calm: 0.04}) == [True, True, True, False, True, True]
     assert verdicts(**{f"{calm} in 3 m/s of wind": 0.07}) == [True, True, True, True, False, True]
     windy = "figure-eight, 5 m/s, model-following in 3 m/s of wind"
     assert not verdicts(**{windy: 0.13})[-1]
-    beaten = find(made_up(**{"circle, 3 m/s, model-following": 0.0233}))[0].evidence
+    beaten = make_findings(made_up(**{"circle, 3 m/s, model-following": 0.0233}))[0].evidence
     assert "circle, 3 m/s: 23.3 mm, first-order 23.0 mm" in beaten
     assert "on 6 of 7 trajectories; on 1 another planner is better" in beaten
 

@@ -28,7 +28,7 @@ from companion.testing import (
     serving,
     session,
 )
-from companion.testing.settings import mock_with
+from companion.testing.settings import mock_with_changes
 from companion.testing.virtual_loop import VirtualClock
 from companion.vehicle.flight_log import read_flight_log
 from companion.vehicle.link import Link
@@ -282,7 +282,7 @@ def test_a_client_hears_what_comes_next_until_it_disconnects():
 
 def test_a_key_below_one_that_is_no_section_is_refused():
     with pytest.raises(ConfigError, match=r"mock\.seed\.deep cannot be set: mock\.seed is 1"):
-        mock_with({"seed": 1}, {"seed.deep": 2})
+        mock_with_changes({"seed": 1}, {"seed.deep": 2})
 
 
 @pytest.mark.parametrize("collecting", [True, False])
@@ -316,7 +316,7 @@ def test_what_is_no_program_no_configuration_or_no_fault_is_refused_in_a_sentenc
 
     with pytest.raises(ValueError, match=r"coroutine was expected, as in run\(vehicle, main\(\)\)"):
         run(mock, main)
-    with pytest.raises(TypeError, match="a configuration is a Config, a path or keys by section"):
+    with pytest.raises(TypeError, match="config must be a Config, a path or a dict of sections"):
         run(mock, main(5))
     with pytest.raises(ConfigError, match="`limit` is not a known key; did you mean `limits`"):
         run(mock, main({"limit": {"max_tilt_deg": 20.0}}))

@@ -69,7 +69,7 @@ def test_a_violation_says_when_what_and_how_much():
     assert broken.begin_time == pytest.approx(first, abs=0.01)
     assert broken.text == (
         f"at {broken.time:.2f} s it needs {degrees(tilt.max()):.4g}° of tilt, "
-        f"limits.max_tilt_deg allows 35 (broken from {broken.begin_time:.2f} s on)"
+        f"limits.max_tilt_deg allows 35 (violated from {broken.begin_time:.2f} s on)"
     )
     assert str(broken) == broken.text
 

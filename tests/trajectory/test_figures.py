@@ -188,7 +188,7 @@ def test_hover_stays():
         (lambda: line((1.0, 0.0, 0.0), 1.0, 1.0, inf), "positive and finite"),
         (lambda: circle(0.0, Laps(1.0)), "size, speed, laps and acceleration of a circle"),
         (lambda: helix(1.0, 1.0, Laps(1.0, 0.0)), "of a helix must be positive"),
-        (lambda: gerono_eight(1.0, Laps(1.0, 1.5)), "laps of a figure-eight must be whole"),
+        (lambda: gerono_eight(1.0, Laps(1.0, 1.5)), "laps of a figure-eight must be a whole"),
     ],
 )
 def test_what_cannot_be_is_refused(make, text):

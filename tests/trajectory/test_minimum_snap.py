@@ -143,7 +143,7 @@ def test_observed_velocities_make_up_for_missing_places():
 def test_too_little_to_go_by_is_an_error():
     states, mask = np.zeros((4, STATE_SIZE, 1)), np.zeros((4, STATE_SIZE), dtype=bool)
     mask[:3, 0] = True
-    with pytest.raises(np.linalg.LinAlgError, match="too few values"):
+    with pytest.raises(np.linalg.LinAlgError, match="too few of its values"):
         minimum_snap(np.arange(4.0), FixedStates(states, mask))
 
 

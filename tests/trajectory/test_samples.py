@@ -221,7 +221,10 @@ GOOD = ["t,x,y,z", "0,0,0,0", "1,1,0,0", "2,2,0,0", "3,3,0,0"]
         (GOOD[:4], "needs a header and at least 4 samples"),
         (["t,x,y", "0,0,0"], "column z of the position is missing; expected .*found t,x,y"),
         (["t,p_x,p_y", *GOOD[1:]], "column p_z of the position is missing; expected .*found t,p_"),
-        (["t,lat,lon", *GOOD[1:]], "x,y,z or .* in NED below a line `# frame: ned`, found"),
+        (
+            ["t,lat,lon", *GOOD[1:]],
+            r"x,y,z or .* \(if in NED, below a line `# frame: ned`\), found",
+        ),
         (["0,0,0,0", *GOOD[1:]], "first line must name the columns, such as t,x,y,z"),
         (["t;x;y;z", *["1;2;3;4"] * 4], "separated by semicolons; use commas"),
         (["t_ms,x,y,z", *GOOD[1:]], "column t_ms is in ms; give t in s, m or rad"),

@@ -192,7 +192,7 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
 @pytest.mark.parametrize(
     ("reserve", "limit"),
     [
-        (0.5, "limits.max_tilt_deg (less flight.slow_down_reserve_m_s2: 0.5) at"),
+        (0.5, "limits.max_tilt_deg (minus flight.slow_down_reserve_m_s2: 0.5) at"),
         (0.0, "limits.max_tilt_deg at"),
     ],
 )

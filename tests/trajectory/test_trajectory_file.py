@@ -199,7 +199,7 @@ def test_a_csv_file_lies_beside_its_yaml_or_stands_alone(tmp_path):
         ("csv: {file: none.csv}", "none.csv: cannot read it: No such file"),
         (
             "figure_eight: {half_width_m: 3, peak_speed_m_s: 2, laps: 1.5}",
-            "the laps of a figure-eight must be whole",
+            "the number of laps of a figure-eight must be a whole number",
         ),
     ],
 )

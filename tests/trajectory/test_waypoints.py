@@ -105,7 +105,7 @@ def test_no_heading_at_all_is_the_one_at_the_start():
         (([(0.0, 0.0, 0.0)], 1.0, 1.0), "waypoint 1 is the same as the start"),
         (([(1.0, 0.0, 0.0)] * 2, 1.0, 1.0), "waypoint 2 is the same as waypoint 1"),
         ((SQUARE, 1.0, 0.0), "must be positive"),
-        ((SQUARE, 1.0, 1.0, True, [0.0] * 4), "either their own headings"),
+        ((SQUARE, 1.0, 1.0, True, [0.0] * 4), "their own headings or the heading along"),
         ((SQUARE, 1.0, 1.0, False, [0.0] * 3), "3 headings for 4 waypoints"),
         (([(0.0, 0.0, -3.0)], 1.0, 1.0, True), "never moves horizontally"),
     ],

@@ -67,7 +67,7 @@ def measured(config, omega):
             at, east, fast = told[0]
             position = LocalPosition(time, at, (0.0, east, -5.0), (0.0, fast, 0.0))
             estimate.note_position(position, offboard_active=False)
-            inputs = estimate.guidance_input(time, guidance.acts_after, (2.0, 18.0))
+            inputs = estimate.guidance_input(time, guidance.effect_delay, (2.0, 18.0))
             target, later, down = guidance.command(lambda _: HELD, time, inputs)
             command = GuidanceCommand(target, down, time, later_target=later, period=5 * DT)
         answer = law.rates(q, command.target_at(time), DT, rates).roll

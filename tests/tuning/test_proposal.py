@@ -121,7 +121,7 @@ def test_flights_stand_in_the_text_with_their_errors_or_their_reasons():
 def test_the_reason_of_a_gain_names_what_limits_it():
     def reason(proposal):
         text = proposal_text(proposal, {}, {}, "a flight")
-        return next(line for line in text.splitlines() if "before 5; " in line)
+        return next(line for line in text.splitlines() if "was 5; " in line)
 
     assert "the largest sensible gain, " in reason(propose(vehicle(60.0, 40.0)))
     quick = propose(vehicle(10.0, 5.0))

@@ -32,7 +32,7 @@ EVERY_AUTOPILOT = pytest.mark.parametrize(
         (ARDUPILOT, 89, 4, "GUIDED", {Role.TAKEOFF, Role.READY}),
         (ARDUPILOT, 81, 4, "GUIDED", {Role.TAKEOFF, Role.READY}),  # disarmed: it obeys nothing
         (ARDUPILOT, 217, 4, "GUIDED", {Role.TAKEOFF, Role.READY}),
-        (ARDUPILOT, 209, 4, "GUIDED by rates", {Role.OFFBOARD}),
+        (ARDUPILOT, 209, 4, "GUIDED (body rates)", {Role.OFFBOARD}),
         (ARDUPILOT, 217, 17, "BRAKE", {Role.HOLD}),
         (ARDUPILOT, 209, 9, "LAND", {Role.LAND}),
         (ARDUPILOT, 217, 6, "RTL", set()),

@@ -75,7 +75,7 @@ def test_each_of_several_checks_knows_the_other_parameters_and_our_settings():
     ("value", "words", "set_to"),
     [
         (0.5, "before companion releases control (deadman.silence_limit_ms 500)", 0.75),
-        (3.0, "held for 3 s: 0.4 rad/s become 69° of tilt", 0.75),
+        (3.0, "held for 3 s: at 0.4 rad/s that is 69° of tilt", 0.75),
     ],
 )
 def test_rates_are_held_neither_too_briefly_nor_too_long(value, words, set_to):

@@ -142,7 +142,7 @@ def test_a_mode_that_nobody_asked_for_is_a_failsafes(bench):
 def test_current_mode_does_not_hide_that_ardupilot_obeys_rates(bench):
     bench.take(dialect.MAVLink_heartbeat_message(2, 3, 209, 4, 4, 3))
     bench.take(development.MAVLink_current_mode_message(0, 4, 4))
-    assert bench.state.mode == "GUIDED by rates"
+    assert bench.state.mode == "GUIDED (body rates)"
 
 
 @pytest.mark.parametrize(

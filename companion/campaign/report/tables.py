@@ -17,7 +17,7 @@ from companion.flight.flown_config import flattened
 from companion.program_command import program_command
 from companion.report.plots import even_indices
 from companion.report.tables import Table
-from companion.testing.settings import complete_mock
+from companion.testing.settings import mock_with_defaults
 
 EMPTY = "–"
 _MOST_WORST_CASES = 10  # cases in the table of worst cases
@@ -68,7 +68,7 @@ def configuration(campaign: Campaign) -> Table:
         if key.section == "limits" or key.value != key.default
     ]
     mock = campaign.base.mock or {}
-    defaults = flattened(complete_mock({"autopilot": mock["autopilot"]}))
+    defaults = flattened(mock_with_defaults({"autopilot": mock["autopilot"]}))
     rows += [
         (f"mock.{key}", value, defaults.get(key, EMPTY), unit_of(key))
         for key, value in flattened(mock).items()

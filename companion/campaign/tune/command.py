@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
             with interruptible(), cluster_client(options.scheduler, options.workers) as client:
                 wait_for_workers(client)
                 console.print(f"Dask's dashboard: {client.dashboard_link}")
-                fly = _make_fly(client, campaign)
+                fly = _fly_function(client, campaign)
                 try:
                     search = Search(campaign, tune, search_folder, fly)
                 except StorageError as error:  # there are no candidates to continue with
@@ -95,7 +95,7 @@ def _begin(search_folder: Path, campaign: Campaign) -> None:
         folder.make(search_folder, campaign, folder.describe(campaign, 1, None))
 
 
-def _make_fly(client: "Client", campaign: Campaign) -> Fly:
+def _fly_function(client: "Client", campaign: Campaign) -> Fly:
     """A function that flies cases on the cluster; the time of a case is measured here first."""
     kind = campaign.file.kind
     seconds_per_case = estimate.case_time(kind, list(campaign.cases())[:1])

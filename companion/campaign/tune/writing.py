@@ -133,9 +133,7 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
 
 def _reason(key: str, swept: SweptValues, result: CheckedResult, value_before: Any) -> str:
     """Text about a key: its value before the search (None: unset), and the best values found."""
-    before_text = (
-        "not set before" if value_before is None else f"before {_value_text(value_before)}"
-    )
+    before_text = "was not set" if value_before is None else f"was {_value_text(value_before)}"
     near_values = [
         candidate.values[key] for candidate in result.results.near_best if key in candidate.values
     ]

@@ -48,7 +48,7 @@ Checked
     motion_violations  like `violations`, for a `Motion`, which is given as arrays
     Motion
     turned_first     a turn on the spot before a trajectory that begins with a heading
-    computable       turns numerical errors into a `TrajectoryError`
+    reporting_numerical_errors  turns numerical errors into a `TrajectoryError`
     LONGEST_DURATION  longest duration that is checked, s
     LARGEST_COORDINATE, LARGEST_SPEED  bounds of coordinates and speeds in files, m and m/s
 """
@@ -87,7 +87,9 @@ from companion.guidance.trajectory.sample import Sample as Sample
 from companion.guidance.trajectory.sample import Trajectory as Trajectory
 from companion.guidance.trajectory.sample import TrajectoryError as TrajectoryError
 from companion.guidance.trajectory.sample import Vector as Vector
-from companion.guidance.trajectory.sample import computable as computable
+from companion.guidance.trajectory.sample import (
+    reporting_numerical_errors as reporting_numerical_errors,
+)
 from companion.guidance.trajectory.slower_time import SlowerTime as SlowerTime
 from companion.guidance.trajectory.slowing import slow_down as slow_down
 from companion.guidance.trajectory.straight_legs import straight_legs as straight_legs

@@ -22,7 +22,9 @@ def checked_table(table: Table) -> Table:
     if count < FEWEST_SAMPLES:
         raise TrajectoryError(f"a table needs at least {FEWEST_SAMPLES} samples, not {count}")
     if times[0] != 0.0 or not (np.diff(times) > 0.0).all():
-        raise TrajectoryError("the times of a table must increase from 0 s; subtract the first one")
+        raise TrajectoryError(
+            "the times of a table must increase from 0 s; subtract the first time from all times"
+        )
     return replace(
         table,
         times=times,

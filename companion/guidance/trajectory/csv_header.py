@@ -141,7 +141,7 @@ def _missing(group: str, header: list[str]) -> str:
         missing_text = f"the column {' and '.join(missing)} of the {group} is missing"
     else:
         missing_text = f"the header names no {group}"
-    frame = ", in NED below a line `# frame: ned`" if group == "position" else ""
+    frame = " (if in NED, below a line `# frame: ned`)" if group == "position" else ""
     return f"{missing_text}; expected {expected}{frame}, found {excerpt(','.join(header))}"
 
 

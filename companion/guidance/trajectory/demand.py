@@ -52,7 +52,7 @@ def sampled_motion(trajectory: Trajectory, times: Sequence[float] | None = None)
 
     Raises:
         TrajectoryError: the trajectory is too long to be checked.
-        FloatingPointError: a value is not finite; see `computable`.
+        FloatingPointError: a value is not finite; see `reporting_numerical_errors`.
     """
     times = trajectory.check_times() if times is None else times
     samples = [trajectory.at(time) for time in times]
@@ -69,7 +69,7 @@ def require_finite(motion: Motion) -> None:
     """Check that all numbers are finite. No limit would refuse NaN: comparisons with it are false.
 
     Raises:
-        FloatingPointError: a value is not finite; see `computable`.
+        FloatingPointError: a value is not finite; see `reporting_numerical_errors`.
         TrajectoryError: an array has another number of rows than `times`.
     """
     count = len(motion.times)

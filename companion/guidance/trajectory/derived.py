@@ -68,7 +68,7 @@ def evenly_slowed(trajectory: Trajectory, factor: float) -> Slowed:
         TrajectoryError: the factor is not positive and finite.
     """
     if not 0.0 < factor < inf:
-        raise TrajectoryError(f"a trajectory is slowed by a positive factor, not {factor:g}")
+        raise TrajectoryError(f"a trajectory must be slowed by a positive factor, not {factor:g}")
     return Slowed(trajectory, SlowerTime(trajectory.duration, (factor,) * 4))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from companion.drag import NO_DRAG, Drag
 from companion.guidance.trajectory.demand import Motion, demand, require_finite, sampled_motion
-from companion.guidance.trajectory.sample import Trajectory, computable
+from companion.guidance.trajectory.sample import Trajectory, reporting_numerical_errors
 from companion.guidance.trajectory.septic_spline import Floats
 
 _ROUNDING = 1e-9
@@ -140,7 +140,7 @@ def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, .
     Raises:
         TrajectoryError: the trajectory cannot be computed, or is too long to be checked.
     """
-    with computable():
+    with reporting_numerical_errors():
         return broken_limits(sampled_motion(trajectory), envelope)
 
 
@@ -162,13 +162,13 @@ def motion_violations(motion: Motion, envelope: Envelope) -> tuple[Violation, ..
     Raises:
         TrajectoryError: a numerical error, a number that is not finite, or unequal lengths.
     """
-    with computable():
+    with reporting_numerical_errors():
         require_finite(motion)
         return broken_limits(motion, envelope)
 
 
 def broken_limits(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
-    """Like `motion_violations`, for a caller that is already within `computable`."""
+    """Like `motion_violations`, for a caller already within `reporting_numerical_errors`."""
     violations_or_none = [
         _violation(motion.times, quantity) for quantity in _limited_quantities(motion, envelope)
     ]
@@ -239,5 +239,5 @@ def _violation(times: Floats, quantity: _LimitedQuantity) -> Violation | None:
         f"{'no less than ' if quantity.is_lower_limit else ''}{limit_value:.4g}{unit}"
     )
     if begin_time < time:
-        text += f" (broken from {begin_time:.2f} s on)"
+        text += f" (violated from {begin_time:.2f} s on)"
     return Violation(quantity.limit, begin_time, time, text)

@@ -173,7 +173,7 @@ def bernoulli_eight(half_width: float, laps: Laps) -> TimedCurve:
 
 def _eight(name: str, half_width: float, curve: Figure, laps: Laps) -> TimedCurve:
     if laps.laps % 1.0:
-        raise TrajectoryError("the laps of a figure-eight must be whole")
+        raise TrajectoryError("the number of laps of a figure-eight must be a whole number")
     return _flown_laps(name, half_width, curve, laps, TangentHeading(-pi / 2.0))
 
 

@@ -128,7 +128,8 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
             last too long, or the heading should follow a path that never moves horizontally; the
             table names another frame than the options, has arrays of other shapes than in `Table`,
             or a number that is not finite; an option is out of range.
-        ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see `computable`.
+        ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see
+            `reporting_numerical_errors`.
     """
     table = checked_table(table)
     _require_options(table, options)

@@ -169,7 +169,7 @@ def _solve_block_tridiagonal(diagonal: Floats, upper: Floats, right: Floats) -> 
         pivot = diagonal[k + 1] - upper[k].T @ reduced_upper[k]
         right[k + 1] -= upper[k].T @ right[k]
     if np.linalg.eigvalsh(pivot)[0] < _SMALLEST_EIGENVALUE:
-        raise np.linalg.LinAlgError("too few values are fixed or observed to determine the spline")
+        raise np.linalg.LinAlgError("the spline is not determined: too few of its values are given")
     right[-1] = np.linalg.solve(pivot, right[-1])
     for k in range(len(upper) - 1, -1, -1):
         right[k] -= reduced_upper[k] @ right[k + 1]

@@ -100,7 +100,8 @@ def _require_rest(begin: Sample, end: Sample) -> None:
     offset = float(np.linalg.norm(begin.position))
     if offset > _SMALLEST_OFFSET:
         raise TrajectoryError(
-            f"it begins {offset:.2f} m from (0, 0, 0); positions count from where the vehicle is"
+            f"it begins {offset:.2f} m from (0, 0, 0); positions are relative to the place of the "
+            "vehicle at the start"
         )
     for sample, verb in ((begin, "begins"), (end, "ends")):
         speed = float(np.linalg.norm(sample.velocity))

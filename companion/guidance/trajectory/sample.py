@@ -75,7 +75,7 @@ class Trajectory(Protocol):
 
 
 @contextmanager
-def computable() -> Iterator[None]:
+def reporting_numerical_errors() -> Iterator[None]:
     """Turn numerical errors in the block into an error for the user.
 
     The checks of files exclude the known causes; this context manager catches the others.

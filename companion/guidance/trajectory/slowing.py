@@ -28,7 +28,7 @@ from companion.guidance.trajectory.sample import (
     LONGEST_DURATION,
     Trajectory,
     TrajectoryError,
-    computable,
+    reporting_numerical_errors,
 )
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.slower_time import SlowerTime
@@ -73,7 +73,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
         TrajectoryError: the trajectory breaks a limit at any speed, cannot be computed, or is too
             long to be checked, as it is or slowed down.
     """
-    with computable():
+    with reporting_numerical_errors():
         motion = sampled_motion(trajectory)
         broken = broken_limits(motion, envelope)
         if not broken:

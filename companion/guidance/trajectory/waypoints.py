@@ -61,7 +61,7 @@ def waypoints(
     if not (0.0 < speed < inf and 0.0 < acceleration < inf):
         raise TrajectoryError("speed and acceleration of waypoints must be positive")
     if face_path and headings:
-        raise TrajectoryError("waypoints have either their own headings or one along the path")
+        raise TrajectoryError("give waypoints their own headings or the heading along the path")
     positions, distances = positions_and_distances(points, headings)
     knots = np.concatenate(([0.0], np.cumsum(_trapezoid_durations(distances, speed, acceleration))))
     knots *= _stretch_factor(_spline_through(knots, positions), knots, speed, acceleration)

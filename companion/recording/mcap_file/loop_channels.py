@@ -73,8 +73,8 @@ SAMPLE = Channel(
     (
         Field("received_s", "When it arrived, on our clock, s."),
         VEHICLE_TIME,
-        Field("time_boot_ms", "The vehicle's stamp as received, ms."),
-        Field("age_s", "Age at arrival, s. NaN: the stamp does not fit the vehicle's clock."),
+        Field("time_boot_ms", "The vehicle's time stamp as received, ms."),
+        Field("age_s", "Age at arrival, s. NaN: the time stamp does not fit the vehicle's clock."),
         *(Field(name, "Attitude, body FRD to world NED.") for name in QUATERNION),
         *_rate_fields("measured", "Measured rate"),
         Field("checked_s", "When the age was checked again before sending, on our clock, s."),
@@ -82,12 +82,12 @@ SAMPLE = Channel(
     (
         CodeField("unanswered", "Why it is unanswered; 0: it was answered.", UNANSWERED_CODES),
         CodeField(
-            "misfit", "Why its stamp does not fit the clock.", ("none", "not_newer", "ahead")
+            "misfit", "Why its time stamp does not fit the clock.", ("none", "not_newer", "ahead")
         ),
         CodeField(
             "age_known", "Whether `age_s` is absolute; else relative to the quickest sample."
         ),
-        CodeField("on", "Whether control is on; while it is off, no sample is answered."),
+        CodeField("on", "Whether the control loop is on; while it is off, no sample is answered."),
         CodeField("taking_over", "Whether offboard was requested."),
         CodeField("offboard_active", "Whether the autopilot obeys the setpoints."),
         CodeField("awaiting_mode", "Whether the mode must be confirmed after a gap."),
@@ -96,7 +96,7 @@ SAMPLE = Channel(
 )
 SETPOINT = Channel(
     "/setpoint",
-    "One setpoint that was sent: the answer to a sample, and what the planner made it from.",
+    "One setpoint that was sent in answer to a sample, and the inputs of the planner.",
     (
         Field("received_s", "When its sample arrived, on our clock, s."),
         VEHICLE_TIME,
@@ -110,8 +110,8 @@ SETPOINT = Channel(
         *(Field(name, "Attitude as the planner sees it, body FRD to NED.") for name in QUATERNION),
         Field("measured_north", "Acceleration coefficient of this attitude, north."),
         Field("measured_east", "Acceleration coefficient of this attitude, east."),
-        Field("planned_north", "Coefficient that the planner plans for now, north; NaN: no plan."),
-        Field("planned_east", "Coefficient that the planner plans for now, east; NaN: no plan."),
+        Field("planned_north", "Coefficient planned for this moment, north; NaN: no plan."),
+        Field("planned_east", "Coefficient planned for this moment, east; NaN: no plan."),
     ),
     (
         CodeField(
@@ -126,7 +126,7 @@ SETPOINT = Channel(
 )
 GUIDANCE = Channel(
     "/guidance",
-    "One step of guidance with a fresh position, unless idle: reference, estimate, wind, drag.",
+    "One step of guidance in flight: reference, estimate, wind, drag.",
     (
         Field("time_s", "Time on our clock, s."),
         VEHICLE_TIME,
@@ -166,7 +166,7 @@ TARGET = Channel(
         Field("later_heading_rate_rad_s", "Feedforward of the heading one period later, rad/s."),
         Field("acceleration_down_m_s2", "Wanted vertical acceleration, down, m/s²."),
         *_rate_fields("body", "Body rate to send instead of the planner's (NaN: the planner's)"),
-        Field("thrust", "Thrust to send instead of that for the acceleration; NaN: none."),
+        Field("thrust", "Thrust, 0..1, that replaces the computed one; NaN: not replaced."),
         Field("turn_rad", "Sum of the heading resets when it was made, rad."),
         Field("period_s", "Period of guidance, s."),
     ),
@@ -203,7 +203,7 @@ ATTITUDE_TARGET = Channel(
     "/attitude_target",
     "A new ATTITUDE_TARGET of an autopilot that takes body rates along its axes.",
     (
-        Field("time_boot_ms", "The vehicle's stamp as received, ms."),
+        Field("time_boot_ms", "The vehicle's time stamp as received, ms."),
         *(Field(name, "Attitude target, body FRD to world NED.") for name in QUATERNION),
     ),
 )

@@ -126,7 +126,7 @@ def _swing(maneuver: Mapping[str, Any]) -> Iterator[Check]:
         f"swings by {rms:.1f}° RMS every {maneuver['swing_period_s']:.2g} s "
         f"(limit {MAX_SWING_RMS:g}°)"
         if is_regular
-        else f"no swing with a period (roll and pitch {rms:.1f}° RMS)",
+        else f"no periodic swing (roll and pitch {rms:.1f}° RMS)",
         rms <= MAX_SWING_RMS or not is_regular,
         "lower planner.gain_per_s or the weights guidance.position_weight_per_s4 and "
         "velocity_weight_per_s2; `companion check-config` names the largest sensible gain",

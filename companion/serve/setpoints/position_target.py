@@ -9,7 +9,7 @@ autopilot.
 from math import hypot, isfinite, pi
 from typing import NamedTuple
 
-from companion.guidance.fence import Place, local_offset
+from companion.guidance.fence import LatLon, local_offset
 from companion.guidance.reference import Vector, rotate
 from companion.mavlink.messages import Message, dialect
 from companion.serve.setpoints.request import (
@@ -92,7 +92,7 @@ def decode_global_target(message: Message, pose: VehiclePose) -> MotionRequest:
     """
     frame = message.coordinate_frame
     if frame in _TERRAIN_FRAMES:
-        raise RefusedSetpoint("heights above terrain are not known here: use AMSL or above home")
+        raise RefusedSetpoint("the terrain is unknown: give a height above sea level or home")
     if frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
         raise RefusedSetpoint(f"coordinate_frame {frame} is not supported")
     position, velocity, acceleration = _groups(message, (0.0, 0.0, message.alt))
@@ -201,7 +201,7 @@ def _complete_vector(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...
 def _to_local(message: Message, origin: Origin, *, above_home: bool) -> Vector:
     """The commanded global position in the local frame, NED, m; the earth is taken as flat."""
     degrees_per_unit = 1e-7
-    place = Place(message.lat_int * degrees_per_unit, message.lon_int * degrees_per_unit)
-    north, east = local_offset(place, Place(origin.latitude, origin.longitude))
+    place = LatLon(message.lat_int * degrees_per_unit, message.lon_int * degrees_per_unit)
+    north, east = local_offset(place, LatLon(origin.latitude, origin.longitude))
     zero_altitude = origin.home_altitude if above_home else 0.0
     return north, east, origin.altitude - zero_altitude - message.alt

@@ -75,9 +75,9 @@ def draw_figure(grid: Grid, example: Example, complete: CompleteLoopFlights) -> 
     _draw_distance(panels["time"], responses)
     dead_times, lags = _grid_values(grid)
     over_dead_time = [GridCell(_CUT_HZ, dead_time, _CUT_LAG_MS) for dead_time in dead_times]
-    _draw_cut(panels["dead time"], grid, over_dead_time, dead_times, "dead time")
+    _draw_cross_track_by(panels["dead time"], grid, over_dead_time, dead_times, "dead time")
     over_lag = [GridCell(_CUT_HZ, _CUT_DEAD_TIME_MS, lag) for lag in lags]
-    _draw_cut(panels["lag"], grid, over_lag, lags, "lag")
+    _draw_cross_track_by(panels["lag"], grid, over_lag, lags, "lag")
     for rate in RATES_HZ:
         _draw_ratios(panels[f"{rate:.0f}"], grid, rate)
     _draw_errors(panels["example errors"], example.model_following_scores)
@@ -108,7 +108,7 @@ def _draw_distance(axes: Axes, responses: dict[Method, Response]) -> None:
     axes.legend(ncols=2)
 
 
-def _draw_cut(
+def _draw_cross_track_by(
     axes: Axes, grid: Grid, cells: list[GridCell], values_ms: list[int], quantity: str
 ) -> None:
     """Draw the cross-track error of every method over the lag or over the dead time.

@@ -22,7 +22,7 @@ from companion.study.outcome import Finding
 _ROUNDING = 1e-9
 
 
-def find(
+def make_findings(
     grid: Grid, example: Example, complete: CompleteLoopFlights, fit_deviations: dict[Method, float]
 ) -> tuple[Finding, ...]:
     """All findings, those on the example first.

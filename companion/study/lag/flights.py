@@ -203,7 +203,7 @@ def fly_example() -> Example:
     )
 
 
-def fly_complete(tick: Tick) -> CompleteLoopFlights:
+def fly_complete_loop(tick: Tick) -> CompleteLoopFlights:
     """Fly every method at every rate, model-following also with wrong lag and dead time."""
     responses, by_rate = {}, {}
     for rate in RATES_HZ:

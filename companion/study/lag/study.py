@@ -4,7 +4,7 @@ from itertools import product
 
 from companion.recording.measurements.second_order import SecondOrderModel
 from companion.study.lag.figure import CAPTION, draw_figure
-from companion.study.lag.findings import find
+from companion.study.lag.findings import make_findings
 from companion.study.lag.flights import (
     DEAD_TIMES_MS,
     EXAMPLE_ERRORS_HZ,
@@ -21,7 +21,7 @@ from companion.study.lag.flights import (
     Grid,
     GridCell,
     Score,
-    fly_complete,
+    fly_complete_loop,
     fly_example,
     fly_grid,
     in_percent,
@@ -54,7 +54,7 @@ def run(tick: Tick) -> Outcome:
     grid = fly_grid(tick)
     tick("the example")
     example = fly_example()
-    complete = fly_complete(tick)
+    complete = fly_complete_loop(tick)
     fitted_models = {
         method: _fit_model(response) for method, response in complete.shown_responses.items()
     }
@@ -91,7 +91,7 @@ def run(tick: Tick) -> Outcome:
                 complete.by_rate[SHOWN_RATE_HZ].model_following_scores,
             ),
         ),
-        findings=find(grid, example, complete, deviations),
+        findings=make_findings(grid, example, complete, deviations),
         series=(*_grid_series(grid), _complete_series(complete)),
     )
 

@@ -28,7 +28,7 @@ _MAX_ANSWER_MS = 10.0
 """Required 99th percentile of the solver process's answer time, ms; half a period."""
 
 
-def find(flights: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
+def make_findings(flights: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
     """All findings."""
     return (
         _solve_time_finding("paper", ("euler", "quaternion"), flights),
@@ -126,7 +126,7 @@ def _dead_time_finding(flights: Flights) -> Finding:
         "ours",
         "Predicting past the dead time helps every model.",
         min(error_ratios.values()) > 1.0,
-        "Error on the figure-eight without this prediction, divided by that with it:"
+        "Error on the figure-eight without this prediction, divided by the error with it:"
         f" {ratios_text}.",
     )
 

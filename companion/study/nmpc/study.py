@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from companion.study.drawing import draw_line, new_figure
 from companion.study.methods import REFERENCE_STYLE
-from companion.study.nmpc.findings import find
+from companion.study.nmpc.findings import make_findings
 from companion.study.nmpc.flights import FLIGHT_S, Flights, fly_all
 from companion.study.nmpc.timing import (
     ColdStarts,
@@ -65,7 +65,7 @@ def run(tick: Tick) -> Outcome:
             _error_table(flights),
             _process_table(times),
         ),
-        findings=find(flights, counts, times),
+        findings=make_findings(flights, counts, times),
         series=(_flights_table(flights),),
     )
 
@@ -89,8 +89,9 @@ def _time_table(flights: Flights) -> Table:
         )
     return Table(
         "nmpc",
-        "Processor time of the solver on the figure-eight, all models in turn: the real-time"
-        f" iteration, and the SQP to its tolerance or to {MAX_ITERATIONS} iterations (the end).",
+        "Processor time of the solver on the figure-eight, all models in turn: for one"
+        " iteration, and to the end, which is the tolerance of the SQP or "
+        f"{MAX_ITERATIONS} iterations.",
         tuple(rows),
     )
 

@@ -58,9 +58,9 @@ def run(tick: Tick) -> Outcome:
             " lag, aerodynamic damping and a rigid body with gyroscopic torque; 8 headings. The"
             " result depends on the speed of that loop, so two loops are flown: that of the bundled"
             " vehicle, which responds as measured on a PX4 (a step of the roll rate reaches 63 %"
-            f" after {1e3 * measured_loop.time_63:.0f} ms), and one with all times"
+            f" after {1e3 * measured_loop.time_to_63_percent:.0f} ms), and one with all times"
             f" {QUICK_SPEEDUP} times"
-            f" shorter ({1e3 * quick_loop.time_63:.0f} ms)."
+            f" shorter ({1e3 * quick_loop.time_to_63_percent:.0f} ms)."
         ),
         figure=_figure(quick_loop, measured_loop, sweep),
         caption=(
@@ -83,7 +83,7 @@ def _table(quick_loop: LoopFlights, measured_loop: LoopFlights) -> Table:
         tuple(
             {
                 "method": method.label,
-                "63 % of a rate step, ms": 1e3 * loop.time_63,
+                "63 % of a rate step, ms": 1e3 * loop.time_to_63_percent,
                 "largest deviation from first order": float(
                     largest_deviation(loop.responses[method], reference).max()
                 ),
@@ -105,10 +105,10 @@ def _sweep_table(sweep: Sweep) -> Table:
         "Cross-track by the speed of the inner loop, heading 0.",
         tuple(
             {
-                "63 % of a rate step, ms": 1e3 * time_63,
+                "63 % of a rate step, ms": 1e3 * time_to_63_percent,
                 **{method.label: cross_tracks[method] for method in PAPER_METHODS},
             }
-            for time_63, cross_tracks in sweep.items()
+            for time_to_63_percent, cross_tracks in sweep.items()
         ),
     )
 
@@ -215,9 +215,8 @@ def _straightness_finding(claimant: Claimant, speed_text: str, loop: LoopFlights
     cross_tracks = {m: loop.cross_track(m) for m in (PROPOSED, QUATERNION, SO3, EULER)}
     return Finding(
         claimant,
-        f"With a complete inner loop that is {speed_text} ({1e3 * loop.time_63:.0f} ms) the"
-        " proposed"
-        " method still is the straightest.",
+        f"With a complete inner loop that is {speed_text} ({1e3 * loop.time_to_63_percent:.0f} ms) "
+        "the proposed method is still the straightest.",
         cross_tracks[PROPOSED]
         < min(largest for m, largest in cross_tracks.items() if m is not PROPOSED),
         "Cross-track over all headings: "

@@ -23,13 +23,14 @@ _SWEPT_SPEEDUPS = (10, 5, 3, 2, 1)
 PROGRESS_STEPS = 2 * len(LAW_METHODS) + len(_SWEPT_SPEEDUPS)
 
 Sweep = dict[float, dict[Method, float]]
-"""Cross-track error at heading 0, by `LoopFlights.time_63` of the inner loop (s) and by method."""
+"""Cross-track error at heading 0, by `LoopFlights.time_to_63_percent` of the inner loop (s) and by
+method."""
 
 
 class LoopFlights(NamedTuple):
     """Flights of every method with one inner loop."""
 
-    time_63: float
+    time_to_63_percent: float
     """Time until the roll rate reaches 63 % of a step of its setpoint, s."""
     responses: dict[Method, Response]
     """Response of each method."""
@@ -55,15 +56,15 @@ class LoopFlights(NamedTuple):
         return float(largest_deviation(self.responses[method], model)[self.worst_heading(method)])
 
     def __str__(self) -> str:
-        return f"63 % in {1e3 * self.time_63:.0f} ms"
+        return f"63 % in {1e3 * self.time_to_63_percent:.0f} ms"
 
 
 def fly_methods(speedup: int, tick: Tick) -> LoopFlights:
     """Fly every method with an inner loop `speedup` times as fast as measured on a PX4."""
     inner_loop = faster_inner_loop(speedup)
-    flights = LoopFlights(inner_loop.rate_time_63(), {}, {})
+    flights = LoopFlights(inner_loop.rate_time_to_63_percent(), {}, {})
     for method in LAW_METHODS:
-        tick(f"{method.label}, {1e3 * flights.time_63:.0f} ms")
+        tick(f"{method.label}, {1e3 * flights.time_to_63_percent:.0f} ms")
         response = fly_loop(planner_of(method, STEP.gain), STEP, inner_loop)
         flights.responses[method] = response
         flights.fitted_models[method] = fit_second_order(
@@ -77,9 +78,9 @@ def fly_sweep(tick: Tick) -> Sweep:
     step, sweep = replace(FIGURE_2, headings=(0.0,)), {}
     for speedup in _SWEPT_SPEEDUPS:
         inner_loop = faster_inner_loop(speedup)
-        time_63 = inner_loop.rate_time_63()
-        tick(f"cross-track, {1e3 * time_63:.0f} ms")
-        sweep[time_63] = {
+        time_to_63_percent = inner_loop.rate_time_to_63_percent()
+        tick(f"cross-track, {1e3 * time_to_63_percent:.0f} ms")
+        sweep[time_to_63_percent] = {
             method: float(cross_track(fly_loop(planner_of(method, STEP.gain), step, inner_loop))[0])
             for method in PAPER_METHODS
         }

@@ -40,7 +40,7 @@ def run(tick: Tick) -> Outcome:
     )
     return Outcome(
         name="rates",
-        title="Sample rates: the discretisation error, and the planner without it",
+        title="Sample rates: the discretisation error, and the exact planner, which has none",
         conditions="The step of figure 2 at 1000, 500, 250, 100 and 50 Hz, three headings.",
         figure=_figure(responses, largest_deviations, steps),
         caption=(
@@ -117,7 +117,7 @@ def _figure(
         EXACT.line_style,
         f"exact, {lowest_hz:.0f} Hz",
     )
-    plane.set(title="Paths, enlarged across", xlabel="($a_E$ + 0.5) × 1000", ylabel="$a_N$")
+    plane.set(title="Paths, axis of $a_E$ enlarged", xlabel="($a_E$ + 0.5) × 1000", ylabel="$a_N$")
     plane.set_xlim(right=5.2)
     plane.legend(loc="center right")
     return figure

@@ -31,8 +31,8 @@ from companion.study.track.tasks import (
 CAPTION = (
     "Circles on the left, figure-eights on the right. First row: true path at the highest speed in"
     " still air, with model-following. Second row: error of every planner in still air by"
-    " telemetry. Third row: true error of the same flights. Last row: with lead (led) and without"
-    " (not led), in still air (solid) and in wind (dotted)."
+    " telemetry. Third row: true error of the same flights. Last row: with `guidance.lead` and"
+    " without, in still air (solid) and in wind (dotted)."
 )
 
 _METHODS = (*LAW_METHODS, MODEL_FOLLOWING_METHOD)
@@ -68,10 +68,16 @@ def _draw_paths(axes: Axes, flights: TrackedFlights, trajectory: TrajectoryAtSpe
     with_lead = flights[Task(trajectory, MODEL_FOLLOWING)]
     without_lead = flights[Task(trajectory, MODEL_FOLLOWING, lead=False)]
     draw_line(
-        axes, with_lead.path[:, 3], with_lead.path[:, 2], MODEL_FOLLOWING_METHOD.line_style, "led"
+        axes,
+        with_lead.path[:, 3],
+        with_lead.path[:, 2],
+        MODEL_FOLLOWING_METHOD.line_style,
+        "with lead",
     )
     line_without_lead = {"color": _COLOUR_WITHOUT_LEAD, "linewidth": 1.0}
-    draw_line(axes, without_lead.path[:, 3], without_lead.path[:, 2], line_without_lead, "not led")
+    draw_line(
+        axes, without_lead.path[:, 3], without_lead.path[:, 2], line_without_lead, "without lead"
+    )
     draw_line(axes, with_lead.path[:, 1], with_lead.path[:, 0], REFERENCE_STYLE, "reference")
     axes.set(title=f"Path: {trajectory}", xlabel="east, m", ylabel="north, m", aspect="equal")
 
@@ -99,12 +105,14 @@ def _draw_lead_and_wind(
             tasks = [
                 Task(trajectory, MODEL_FOLLOWING, LINEAR, wind, lead) for trajectory in trajectories
             ]
-            label = f"model-following{'' if lead else ', not led'}{wind_label}"
+            label = f"model-following{'' if lead else ', without lead'}{wind_label}"
             _draw_over_speed(axes, tasks, errors, {**style, "color": colour}, label)
     tasks = [Task(trajectory, PROPOSED.planner, LINEAR, WINDY) for trajectory in trajectories]
     line = {**_IN_WIND, "color": PROPOSED.colour}
     _draw_over_speed(axes, tasks, errors, line, f"first-order, wind of {WINDY:g} m/s")
-    axes.set(title="Led and not led, still air and wind", yscale="log", yticks=_ERROR_TICKS_MM)
+    axes.set(
+        title="With and without lead, still air and wind", yscale="log", yticks=_ERROR_TICKS_MM
+    )
     axes.yaxis.set_major_formatter("{x:g}")
     axes.minorticks_off()
 

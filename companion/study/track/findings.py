@@ -34,7 +34,7 @@ ErrorSelector = Callable[[TrackedFlight], float]
 """Returns one of the errors of a flight, m."""
 
 
-def find(flights: TrackedFlights) -> tuple[Finding, ...]:
+def make_findings(flights: TrackedFlights) -> tuple[Finding, ...]:
     """All findings, those on the planners first."""
     return (
         _smallest_error_finding(

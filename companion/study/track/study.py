@@ -7,7 +7,7 @@ from companion.attitude import PLANNER_NAMES
 from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
 from companion.study.outcome import Cell, Outcome, Table, Tick
 from companion.study.track.figure import CAPTION, draw_figure
-from companion.study.track.findings import find
+from companion.study.track.findings import make_findings
 from companion.study.track.flights import (
     GUST_SHARE,
     MAX_TILT_DEG,
@@ -55,16 +55,17 @@ def run(tick: Tick) -> Outcome:
             " companion uses configs/mock-px4.yaml, with limits of"
             f" {MAX_TILT_DEG:g}° and {MAX_TILT_RATE_DEG_S:g} °/s. The wind is {WINDY:g} m/s from"
             f" north, with gusts of {GUST_SHARE * WINDY:g} m/s (standard deviation, north and"
-            " east). All flights have the same seed, so the same noise and the same gusts; with"
-            " another seed the differences between planners change by at most 0.2 mm. The error by"
-            " telemetry is that of the position that guidance receives, 10 ms late. The vehicle is"
+            " east). Lead (`guidance.lead`) compensates the response of the attitude loop. All"
+            " flights have the same seed, so the same noise and the same gusts; with another seed"
+            " the differences between planners change by at most 0.2 mm. The error by telemetry is"
+            " that of the position that guidance receives, 10 ms late. The vehicle is"
             " in truth 10 ms ahead of this position, so a planner that lags by 10 ms has a smaller"
             " true error."
         ),
         figure=draw_figure(flights),
         caption=CAPTION,
         tables=_tables(flights),
-        findings=find(flights),
+        findings=make_findings(flights),
         series=(_flights_table(flights),),
         rows=_rows(flights),
     )
@@ -137,7 +138,7 @@ def _flights_table(flights: TrackedFlights) -> Table:
                 "planner": task.planner,
                 "guidance": task.guidance,
                 "wind, m/s": task.wind,
-                "led": "yes" if task.lead else "no",
+                "lead": "yes" if task.lead else "no",
                 "rms, m": _cell(flight.telemetry_error.rms),
                 "largest, m": _cell(flight.telemetry_error.largest),
                 "true rms, m": _cell(flight.true_error.rms),
@@ -175,15 +176,15 @@ def _lead_and_wind_table(flights: TrackedFlights) -> Table:
     return Table(
         "track-lead-and-wind",
         f"Position error by telemetry, rms, mm: in still air and in {WINDY:g} m/s of wind, with"
-        " lead and without (not led). In wind the circle at 7 m/s needs more thrust than the"
-        " vehicle has.",
+        " lead (`guidance.lead`) and without. In wind the circle at 7 m/s needs more thrust than"
+        " the vehicle has.",
         tuple(
             {
                 "trajectory": str(trajectory),
                 "still: model-following": rms(trajectory, MODEL_FOLLOWING, CALM),
-                "still: not led": rms(trajectory, MODEL_FOLLOWING, CALM, lead=False),
+                "still: without lead": rms(trajectory, MODEL_FOLLOWING, CALM, lead=False),
                 "wind: model-following": rms(trajectory, MODEL_FOLLOWING, WINDY),
-                "wind: not led": rms(trajectory, MODEL_FOLLOWING, WINDY, lead=False),
+                "wind: without lead": rms(trajectory, MODEL_FOLLOWING, WINDY, lead=False),
                 "wind: first-order": rms(trajectory, FIRST_ORDER, WINDY),
             }
             for trajectory in TRAJECTORIES

@@ -58,7 +58,7 @@ class Task(NamedTuple):
     def __str__(self) -> str:
         wind = f" in {self.wind:g} m/s of wind" if self.wind else ""
         guidance = "" if self.guidance == LINEAR else f", {self.guidance}"
-        lead = "" if self.lead else ", not led"
+        lead = "" if self.lead else ", without lead"
         return f"{self.trajectory}, {self.planner}{guidance}{lead}{wind}"
 
 

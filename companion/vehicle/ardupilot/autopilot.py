@@ -31,7 +31,7 @@ _MODES: dict[str, int] = {
     if number != dialect.COPTER_MODE_ENUM_END
 }
 _MODE_NAMES = {number: name for name, number in _MODES.items()}
-_GUIDED_BY_RATES = "GUIDED by rates"
+_GUIDED_BY_RATES = "GUIDED (body rates)"
 _ROLES_BY_MODE = {
     "GUIDED": frozenset({Role.TAKEOFF, Role.READY}),
     _GUIDED_BY_RATES: frozenset({Role.OFFBOARD}),

@@ -69,8 +69,8 @@ def _ground_station(value: float, values: Values, settings: CompanionSettings) -
 def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     if value >= settings.attitude_rate_hz:
         return None
-    setting = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
-    return Problem(INEFFECTIVE, f"the main loop is slower, so {setting} is refused; lower the key")
+    fact = f"the main loop is slower than link.attitude_rate_hz {settings.attitude_rate_hz:g}"
+    return Problem(INEFFECTIVE, f"{fact}, so this rate is refused; lower link.attitude_rate_hz")
 
 
 def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:
