@@ -156,9 +156,10 @@ def read_unit(folder: Path, number: int) -> "pa.Table":
     try:
         return pq.read_table(path)
     except (pa.ArrowException, OSError) as error:
+        reason = " ".join(str(error).split()).rstrip(".")  # Arrow's may end in a line break
         raise ConfigError(
-            f"{path}: cannot be read: {str(error).rstrip('.')}; delete this file and continue the "
-            "campaign: only its flights are flown again"
+            f"{path}: cannot be read: {reason}; delete this file and continue the campaign: only "
+            "its flights are flown again"
         ) from error
 
 

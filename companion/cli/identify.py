@@ -53,9 +53,11 @@ def identify(options: argparse.Namespace) -> int:
     if options.out is not None:
         require_writable(options.out, "--out", force=options.force)
     summary = _fly_doublets(options, console)
-    if summary.result != "ok" or summary.log is None:
-        _print_json(options, {"result": summary.result, "log": str(summary.log)})
+    if summary.result != "ok":
+        _print_json(options, {"result": summary.result, "log": summary.as_dict()["log"]})
         return EXIT_FAILURE
+    if summary.log is None:
+        raise LogError("the record of the flight was removed or renamed, so nothing can be fitted")
     log = summary.log / TLOG_FILE
     out = options.out or log.with_name(_FRAGMENT)
     try:

@@ -37,8 +37,8 @@ class FlightConfig(Section):
     """true, or the option --arm: the program arms the vehicle. false: the program waits until the
     pilot arms it."""
     take_over: bool = False
-    """true, or the option --take-over: the pilot takes off, climbs to takeoff_height_m or higher, and
-    hands over by switching to hold (GUIDED on ArduPilot); at the end the vehicle holds for the
+    """true, or the option --take-over: the pilot takes off, climbs to takeoff_height_m or higher,
+    and hands over by switching to hold (GUIDED on ArduPilot); at the end the vehicle holds for the
     pilot. false: the autopilot takes off and lands."""
     accept: Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=100)] = ()
     """Names of unsafe findings of `companion doctor` that do not prevent a flight, such as

@@ -74,6 +74,13 @@ class GroundContact:
         return self.standing and not self.takeoff_commanded and self._plausibly_on_ground()
 
     @property
+    def resting(self) -> bool:
+        """Whether landed flag, height and vertical speed agree that it stands on the ground."""
+        position = self._state.position
+        is_fresh = position is not None and self._clock() - position.received < _MAX_SPEED_AGE
+        return is_fresh and self._state.landed and self._plausibly_on_ground()
+
+    @property
     def standing(self) -> bool:
         """Whether the landed flag is set and the vehicle has not risen since a take-off command."""
         return self._state.landed and not self._has_left_ground and not self._is_rising()

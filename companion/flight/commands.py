@@ -21,9 +21,9 @@ _COMMAND_EFFECT_TIMEOUT = 3.0
 shows its effect later than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
-_REASON_TEXT_DELAY = 0.3
-"""Largest time between a mode change and the STATUSTEXT that gives the reason, s."""
-_FAILSAFE_TEXT = "the autopilot's failsafe took over"
+FAILSAFE_TEXT = "the autopilot's failsafe took over"
+_UNWATCHED_TIME = 3.0
+"""Longest time from a long stall of this program to a heartbeat from after the stall, s."""
 
 IsDone = Callable[[], bool]
 """Returns whether the vehicle has obeyed the command; may raise `FlightEnded` instead."""
@@ -64,7 +64,7 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     if released_by and not link.state.mode_by_failsafe:
         raise ControlReleased(f"{released_by} commanded mode {link.state.mode}", Exit.RELEASE)
     if link.state.mode_by_failsafe:
-        raise FlightEnded(f"{_FAILSAFE_TEXT}: mode {link.state.mode}", Exit.RELEASE)
+        raise FlightEnded(f"{FAILSAFE_TEXT}: mode {link.state.mode}", Exit.RELEASE)
     raise _taken_over(link)
 
 
@@ -75,7 +75,13 @@ def require_armed_in_air(context: FlightContext) -> None:
         FlightEnded: the vehicle is disarmed, and has not been on the ground all the time.
     """
     if context.link.state.armed is False and not context.ground.standing:
-        raise FlightEnded(DISARMED_IN_FLIGHT, Exit.RELEASE)
+        counters, now = context.snapshot_builder.counters, asyncio.get_running_loop().time()
+        was_stopped = now - counters.long_stall_ended_at < _UNWATCHED_TIME
+        raise (DisarmedUnwatched if was_stopped else FlightEnded)(DISARMED_IN_FLIGHT, Exit.RELEASE)
+
+
+class DisarmedUnwatched(FlightEnded):
+    """The vehicle is disarmed; this program was stopped when it disarmed."""
 
 
 class ModeTakenOver(FlightEnded):
@@ -85,25 +91,6 @@ class ModeTakenOver(FlightEnded):
 def _taken_over(link: Link) -> ModeTakenOver:
     text = f"the pilot or another station took over: mode {link.state.mode}"
     return ModeTakenOver(text, Exit.RELEASE)
-
-
-async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
-    """Return `ended`; its reason is the autopilot's geofence if the geofence changed the mode.
-
-    ArduPilot reports a geofence breach only in a STATUSTEXT. Control is released before this
-    function waits for the text.
-    """
-    if not isinstance(ended, ModeTakenOver | ControlReleased):
-        return ended
-    state, fence_text = context.link.state, context.link.autopilot.fence_text
-    if fence_text is None:
-        return ended
-    context.release()
-    mode, earliest_text_time = state.mode, state.mode_received_at - _REASON_TEXT_DELAY
-    await asyncio.sleep(_REASON_TEXT_DELAY)
-    if not any(fence_text in each.text for each in state.texts if each.time >= earliest_text_time):
-        return ended
-    return FlightEnded(f"{_FAILSAFE_TEXT}: mode {mode}", ended.exit)
 
 
 async def command_if_ours(

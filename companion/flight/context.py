@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 from companion.attitude import is_unit
@@ -50,6 +51,20 @@ _MAX_ATTITUDE_AGE = 1.0
 
 _HEARTBEAT_ID = 0.0
 """Message id of HEARTBEAT, as a float for the command that requests a message."""
+
+
+async def wait_for_first(awaited: Iterable[asyncio.Future[Any]], seconds: float) -> None:
+    """Wait until one of `awaited` is done, at most `seconds` s in which this program runs.
+
+    After a stall of this program, what happened meanwhile has yet to be read.
+    """
+    clock, timeout = asyncio.get_running_loop().time, None if seconds == inf else seconds
+    due = clock() + seconds
+    done, _ = await asyncio.wait(awaited, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
+    stalled = clock() - due
+    if not done and stalled > _SHORTEST_STALL:
+        timeout = min(stalled, seconds)
+        await asyncio.wait(awaited, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
 
 
 @dataclass(slots=True)
@@ -195,6 +210,19 @@ class FlightContext:
         if sample is None or now - sample.received > _MAX_ATTITUDE_AGE or not is_unit(sample.q):
             return None
         return tilt_angle(sample.q[1], sample.q[2])
+
+    def heard_instead(self) -> str:
+        """Other systems that are heard, as a clause for the user; "" if there is none.
+
+        A vehicle may come back from a restart with another system id.
+        """
+        link = self.config.link
+        sources = self.link.stats.foreign_sources
+        systems = {system for system, component in sources if component == link.target_component}
+        if not systems:
+            return ""
+        names = ", ".join(map(str, sorted(systems)))
+        return f"; system {names} is heard, but link.target_system is {link.target_system}"
 
     def armed(self) -> bool:
         """Whether the autopilot reports that the vehicle is armed."""

@@ -6,8 +6,8 @@ from contextlib import aclosing
 from math import inf
 from typing import Any
 
-from companion.flight.commands import with_cause
-from companion.flight.context import FlightContext, cancel
+from companion.flight.cause import with_cause
+from companion.flight.context import FlightContext, cancel, wait_for_first
 from companion.flight.observer import Observer
 from companion.flight.phase import Phase
 from companion.flight.phases import EXIT_PHASES, ground_phases
@@ -164,12 +164,10 @@ class Flight:
             raise self._end_future.result()
 
     async def _run_until_end(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:
-        """Run `work` until it is done, the flight is ended, or `seconds` are over."""
+        """Run `work` until it is done, the flight is ended, or `seconds`, less stalls, are over."""
         task = asyncio.create_task(work)
-        awaited: set[asyncio.Future[Any]] = {task, self._end_future}
         try:
-            timeout = None if seconds == inf else seconds
-            await asyncio.wait(awaited, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
+            await wait_for_first({task, self._end_future}, seconds)
             if self._end_future.done():
                 return None
             if not task.done():
@@ -185,7 +183,10 @@ class Flight:
             await cancel(task)
 
     def _usual_exit(self) -> Exit:
-        return self.phase.exit_on_failure(standing=self._context.ground.standing)
+        context = self._context
+        taken = context.loop.taking_over or context.loop.offboard_active
+        exit_ = self.phase.exit_on_failure(standing=context.ground.standing, taken=taken)
+        return Exit.LEAVE if exit_ is Exit.DISARM and not context.must_disarm else exit_
 
     async def _leave(self, exit_: Exit) -> None:
         """Run the exit, then land if the user wants to; a failure is noted, not raised."""
@@ -194,7 +195,7 @@ class Flight:
             if exit_ is Exit.HOLD and self._interruption and await self._user_wants_landing():
                 await self._fly_exit(Exit.LAND)
         except FlightEnded as ended:
-            self.note(ended.reason)
+            self.note((await with_cause(self._context, ended)).reason)
 
     async def _fly_exit(self, exit_: Exit) -> None:
         """Run the phases of an exit; if a phase fails, run the exit of the failed phase."""

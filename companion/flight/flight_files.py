@@ -176,7 +176,8 @@ class FlightFiles:
     def save(self, summary: Summary) -> Summary:
         """Write `summary.json`, once the log is closed; return the summary.
 
-        A write that fails or takes too long is noted as an event.
+        A write that fails or takes too long is noted as an event. If the folder is gone, the
+        summary names none.
         """
         dropped_count = sum(file.dropped for file in (self.tap, self.mcap) if file is not None)
         events = list(summary.events)
@@ -194,7 +195,7 @@ class FlightFiles:
         failure = write_with_timeout(folder / "summary.json", text)
         if failure is not None:
             self._note(f"{folder}: summary.json was not written: {failure}")
-        return completed
+        return completed if folder.is_dir() else replace(completed, log=None)
 
 
 def _counters(stats: LinkStats) -> dict[str, int]:

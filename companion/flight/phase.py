@@ -26,6 +26,8 @@ class Phase:
     """What the flight does with the vehicle if the phase fails."""
     on_failure_on_ground: Exit | None = None
     """Like `on_failure`, while the vehicle stands on the ground; None: `on_failure`."""
+    on_failure_untaken: Exit | None = None
+    """Like `on_failure`, before the takeover is commanded; None: `on_failure`."""
     allowed_roles: frozenset[Role] = frozenset()
     """Roles of the allowed modes; any other or unknown mode counts as a takeover by the pilot.
     Empty: any mode is allowed."""
@@ -35,8 +37,13 @@ class Phase:
     lands: bool = False
     """Whether the vehicle lands in the phase. If it is disarmed and falls, the phase has failed."""
 
-    def exit_on_failure(self, *, standing: bool) -> Exit:
-        """What the flight does if the phase fails; `standing`: the vehicle stands on the ground."""
+    def exit_on_failure(self, *, standing: bool, taken: bool) -> Exit:
+        """What the flight does if the phase fails.
+
+        `standing`: the vehicle stands on the ground. `taken`: its takeover was commanded.
+        """
         if self.on_failure_on_ground is not None and standing:
             return self.on_failure_on_ground
+        if self.on_failure_untaken is not None and not taken:
+            return self.on_failure_untaken
         return self.on_failure

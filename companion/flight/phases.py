@@ -114,7 +114,7 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """Checks and takeover of a vehicle that its autopilot holds in the air."""
     checks = _checks(config, "to be taken over", takeover.check_airborne, _TAKEOFF_ROLES)
-    return checks, _takeover(Exit.HOLD)
+    return checks, _takeover(Exit.HOLD, Exit.LEAVE)
 
 
 def handover_phases(config: FlightConfig) -> tuple[Phase, ...]:
@@ -131,7 +131,7 @@ def handover_phases(config: FlightConfig) -> tuple[Phase, ...]:
 def takeoff_for_client_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """Checks, take-off and takeover of a vehicle that somebody else armed on the ground."""
     checks = _checks(config, "to take off", takeover.check_armed_on_ground, _ARMED_ON_GROUND_ROLES)
-    return checks, _takeoff(config), _takeover(Exit.HOLD)
+    return checks, _takeoff(config), _takeover(Exit.HOLD, Exit.LEAVE)
 
 
 def _checks(config: FlightConfig, purpose: str, work: Work, roles: frozenset[Role]) -> Phase:
@@ -156,14 +156,19 @@ def _takeoff(config: FlightConfig) -> Phase:
     )
 
 
-def _takeover(on_failure: Exit) -> Phase:
-    """The phase of the takeover; after a failure, `on_failure` lands or holds the vehicle."""
+def _takeover(on_failure: Exit, on_failure_untaken: Exit | None = None) -> Phase:
+    """The phase of the takeover.
+
+    After a failure, `on_failure` lands or holds the vehicle. Before the takeover is commanded,
+    `on_failure_untaken` may leave it to those who flew it.
+    """
     return Phase(
         "offboard",
         "the autopilot to obey our body rates",
         takeover.offboard,
         _TAKEOVER_TIMEOUT,
         on_failure,
+        on_failure_untaken=on_failure_untaken,
         allowed_roles=_TAKEOFF_ROLES | _OFFBOARD_ROLES,
         monitored=True,
     )

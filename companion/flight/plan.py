@@ -60,9 +60,9 @@ class ConfiguredPlan:
 class TakeoverPlan:
     """Takes over a vehicle that its autopilot holds in the air, flies references, hands it back.
 
-    The program does not arm. If the checks fail, the vehicle is left as it is. If the takeover or
-    the source fails, the autopilot is asked to hold. If the take-off fails in the air, the
-    autopilot is asked to land.
+    The program does not arm. If the checks fail, also those before the takeover, the vehicle is
+    left as it is. If the takeover or the source fails, the autopilot is asked to hold. If the
+    take-off fails in the air, the autopilot is asked to land.
 
     Args:
         source: source of references; it decides when control ends.

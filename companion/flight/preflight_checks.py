@@ -12,7 +12,7 @@ from companion.flight.vehicle_identity import ReplacementDetector
 from companion.guidance import ManeuverSequence
 from companion.preflight.all_checks import blocking_findings, run_checks, unsafe_findings
 from companion.preflight.evidence import Evidence, Identity, Stage
-from companion.preflight.finding import Finding
+from companion.preflight.finding import Finding, Key
 from companion.preflight.parameters import parameters
 from companion.preflight.session import gather, wanted_rates
 from companion.preflight.stream_checks import minimum_rates
@@ -25,6 +25,14 @@ _COUNTING_TIME = 1.0
 """Time over which telemetry rates are counted while the parameters are read, s."""
 _MAX_EVIDENCE_AGE = 1.0
 """Time for which counted rates and read parameters stay valid, s."""
+_PASSING_FINDINGS = frozenset(
+    {Key.AGE, Key.LOSS, Key.ROUND_TRIP, "link.min_attitude_rate_hz", "link.min_position_rate_hz"}
+)
+"""Findings that a short disturbance of the link causes."""
+
+
+class _LinkDisturbedError(FlightEnded):
+    """Only findings block that a short disturbance of the link causes."""
 
 
 class PreflightChecks:
@@ -100,6 +108,23 @@ class PreflightChecks:
         self._act_on(run_checks(self._config, evidence, repeated=earlier_evidence is not None))
         return evidence
 
+    async def require_within(self, seconds: float, stage: Stage) -> None:
+        """Like `require`, but repeat the checks for `seconds` while only a disturbed link blocks.
+
+        A gap of some tenths of a second is soon over.
+        """
+        give_up_at = self._clock() + seconds
+        while True:
+            try:
+                await self.require(stage)
+            except _LinkDisturbedError as disturbed:
+                if self._clock() > give_up_at:
+                    raise
+                self._note_once(f"{disturbed.reason}; the checks are repeated")
+                self._gathered_at = -inf
+            else:
+                return
+
     async def _gather(self, stage: Stage, earlier_evidence: Evidence | None) -> Evidence:
         return await gather(
             self._link,
@@ -166,7 +191,9 @@ class PreflightChecks:
             if finding not in blocking:
                 self._note_once(f"unsafe, but accepted by flight.accept: {finding.sentence()}")
         if blocking:
-            raise FlightEnded("; and ".join(finding.sentence() for finding in blocking))
+            disturbed = all(finding.key in _PASSING_FINDINGS for finding in blocking)
+            failure = _LinkDisturbedError if disturbed else FlightEnded
+            raise failure("; and ".join(finding.sentence() for finding in blocking))
 
     def _note_once(self, text: str) -> None:
         if text not in self._noted_texts:

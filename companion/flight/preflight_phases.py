@@ -11,6 +11,7 @@ from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.leave_offboard import leave_offboard
 from companion.flight.maneuver_checks import require_inside, require_still_flyable
+from companion.flight.vehicle_identity import LONGEST_SILENCE
 from companion.guidance.fence import LatLon
 from companion.mavlink.commands import ARM, DISARM
 from companion.preflight import vehicle_checks
@@ -96,9 +97,7 @@ async def arm(context: FlightContext) -> None:
     ready = context.link.autopilot.ready_mode
     if context.link.state.mode == ready:
         context.note(f"the vehicle is in {ready} already: arming it starts the flight")
-    await context.until(
-        context.armed, "the pilot to arm (flight.arm is false, --arm was not given)"
-    )
+    await context.until(lambda: _pilot_has_armed(context))
     await context.preflight.require(Stage.ARMED)
     await context.until(
         lambda: _handed_over(context),
@@ -107,13 +106,8 @@ async def arm(context: FlightContext) -> None:
 
 
 async def undo_arming(context: FlightContext) -> None:
-    """Disarm if we armed the vehicle or commanded the take-off; otherwise leave it as it is.
-
-    After our take-off command, a vehicle that the pilot armed is disarmed, too: it may still climb.
-    """
+    """Disarm the vehicle that we armed, or whose take-off we commanded: it may still climb."""
     context.release()
-    if not context.must_disarm:
-        return
     context.waiting_for = "the autopilot to accept disarming"
 
     def require_control() -> None:
@@ -230,6 +224,15 @@ def _report_offboard_loss(context: FlightContext, values: Values) -> None:
         f"offboard loss: if our setpoints stop, {autopilot.name} holds the last rates for "
         f"{hold_time_text} ({failsafe.parameter}); then {failsafe.action}"
     )
+
+
+def _pilot_has_armed(context: FlightContext) -> bool:
+    silence = context.snapshot_builder.long_silence(asyncio.get_running_loop().time())
+    context.waiting_for = "the pilot to arm (flight.arm is false, --arm was not given)"
+    if silence is not None and silence > LONGEST_SILENCE:  # its arming would not be seen
+        others = context.heard_instead()
+        context.waiting_for = f"the vehicle, which has not been heard for {silence:.0f} s{others}"
+    return context.armed()
 
 
 def _handed_over(context: FlightContext) -> bool:

@@ -18,6 +18,10 @@ _REQUEST_PERIOD = 5.0
 flight sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
 _MAX_POSITION_AGE = 0.2
 """A status is requested only while positions are newer than this, s: else the link is silent."""
+_LARGEST_STARVED_SHARE = 0.5
+"""If this program was stopped for a larger share of the second, low rates are its own fault."""
+_LONGEST_CHECK_PERIOD = 0.5
+"""After a longer time between two checks this program was stopped: statuses wait to be read, s."""
 _COUNTING_TIME = 0.1
 """Window in which `set_rates` counts messages, s; short, because the result is not used."""
 
@@ -43,10 +47,12 @@ class RateRequester:
         self._link_config = link_config
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._requested_at: dict[str, float] = {}
-        self._last_silence = -inf
+        self._last_silence = self._checked_at = -inf
 
     def check(self, now: float, health: Health) -> None:
         """Request each message whose rate is too low at `now`, s of event-loop time."""
+        if (health.starved_share or 0.0) > _LARGEST_STARVED_SHARE:
+            return  # this program did not run, so it did not count
         settings = self._link_config
         answer_rate, position_rate = health.answer_rate, health.position_rate
         # After a request, one more gap may have another cause; a low rate causes two at once.
@@ -72,7 +78,9 @@ class RateRequester:
             heartbeat_limit: age from which the mode counts as unknown, s.
         """
         state, wanted_rates = self._link.state, self._link.autopilot.wanted_rates
-        if state.position is None or now - state.position.received > _MAX_POSITION_AGE:
+        since_check, self._checked_at = now - self._checked_at, now
+        is_silent = state.position is None or now - state.position.received > _MAX_POSITION_AGE
+        if is_silent or since_check > _LONGEST_CHECK_PERIOD:
             self._last_silence = now
             return
         statuses = (

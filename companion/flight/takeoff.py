@@ -1,8 +1,10 @@
 """The phase in which the autopilot takes off."""
 
 import asyncio
-from math import degrees, dist, radians
+from math import degrees, radians
 
+from companion.attitude import heading
+from companion.attitude.representation import wrap_angle
 from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import FlightContext
 from companion.preflight.evidence import Stage
@@ -15,11 +17,8 @@ _MAX_HOLDING_CLIMB_SPEED = 0.3
 MAX_UNDERSHOOT = 0.5
 """A climb may end this far below the commanded height, m."""
 
-_MAX_OVERSHOOT = 3.0
+MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
-
-_LARGEST_DRIFT = 3.0
-"""Largest horizontal drift by wind in a climb, m; a vehicle farther away was flown by somebody."""
 
 _ARRIVAL_TIMEOUT = 2.0
 """Time allowed to reach altitude after the mode changed to hold, s; then the climb has failed."""
@@ -32,8 +31,10 @@ _TIPPED_TILT = radians(60.0)
 detector."""
 
 _SHORTEST_LIFT_OFF_TIMEOUT = 10.0
-"""Shortest time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full
-thrust meanwhile."""
+"""Shortest time to leave the ground, s; PX4 needs 4 s. Blocked motors get full thrust meanwhile."""
+
+_SHORTEST_STALL = 0.5
+"""A longer time between two checks of the climb is a stall of this program, s."""
 
 _LIFT_OFF_FRACTION = 0.25
 """Part of flight.takeoff_timeout_s allowed to leave the ground: some motors spool up for 10 s."""
@@ -77,23 +78,20 @@ async def takeoff(context: FlightContext) -> None:
     await context.until(climb.is_over)
 
 
-async def is_in_our_takeoff(context: FlightContext) -> bool:
-    """Whether a vehicle that is heard again takes off for us, or holds at the take-off height.
+def require_steady_heading(context: FlightContext, jump_on_ground: float = 0.0) -> None:
+    """Raise `FlightEnded` if the heading jumped in our take-off more than it may in our control.
 
-    If the vehicle holds lower or elsewhere, somebody else has stopped it or flown it there.
+    The autopilot holds with the same heading: the sooner it lands, the less far it is carried.
+    `jump_on_ground`: jump while the vehicle still stood, rad.
     """
-    state, takeoff_position = context.link.state, context.takeoff_position
-    if takeoff_position is None:
-        return False
-    position = await context.next_position()
-    if dist(takeoff_position, position.position_ned[:2]) > _LARGEST_DRIFT:
-        return False
-    if in_role(context.link, Role.TAKEOFF):
-        return True
-    if not in_role(context.link, Role.READY) or state.mode_by_failsafe or state.height is None:
-        return False
-    height_error = state.height - context.config.flight.takeoff_height_m
-    return -MAX_UNDERSHOOT < height_error < _MAX_OVERSHOOT
+    jump = max(abs(jump_on_ground), abs(context.loop.resets.frame.offset))
+    limit = context.config.safety.max_reset_angle
+    if context.takeoff_position is not None and jump > limit:
+        raise FlightEnded(
+            f"not taken over: the estimated heading jumped by {degrees(jump):.0f}° in the "
+            f"take-off, more than safety.max_reset_deg = {degrees(limit):g}; check the compass",
+            None if context.ground.standing else Exit.LAND,
+        )
 
 
 class _Climb:
@@ -101,13 +99,14 @@ class _Climb:
 
     def __init__(self, context: FlightContext, height: float) -> None:
         self._context, self._height = context, height
-        self._began = asyncio.get_running_loop().time()
+        self._began = self._last_check = asyncio.get_running_loop().time()
         timeout = _LIFT_OFF_FRACTION * context.config.flight.takeoff_timeout_s
         self._lift_off_timeout = max(_SHORTEST_LIFT_OFF_TIMEOUT, timeout)
         self._mode_before = context.link.state.mode
         self._has_begun = False
         self._hold_began: float | None = None
         self._ground_flag_at_height_since: float | None = None
+        self._start_heading = _heading(context)
         motion = context.guidance_loop.motion
         self._start_down = None if motion is None else motion.position_ned[2]
 
@@ -123,17 +122,19 @@ class _Climb:
     def is_over(self) -> bool:
         """Whether the height is reached; raise `FlightEnded` if somebody stopped the climb."""
         context, state = self._context, self._context.link.state
+        self._leave_out_stall()
         if not context.armed():
             raise FlightEnded(
                 "the pilot, the autopilot or another station disarmed the vehicle during the "
                 "take-off",
                 Exit.RELEASE,
             )
+        require_steady_heading(context, self._jump_on_ground())
         height, position = state.height, context.fresh_position()
         if height is None or position is None:
             return False
         context.waiting_for = f"{self._height:g} m, now {height:.1f} m"
-        if height > self._height + _MAX_OVERSHOOT:
+        if height > self._height + MAX_OVERSHOOT:
             raise self._jump_failure(height) or FlightEnded(
                 f"the vehicle climbed to {height:.1f} m, but flight.takeoff_height_m is "
                 f"{self._height:g}"
@@ -149,6 +150,18 @@ class _Climb:
             self._require_leaving_ground(height)
             return False  # a vehicle that stands must not be taken over: the thrust would lift it
         return is_near_height and climb_has_ended(context)
+
+    def _jump_on_ground(self) -> float:
+        """Jump of the heading of a vehicle that still stands, rad; there `resets` forgets it."""
+        standing = self._context.ground.standing
+        return wrap_angle(_heading(self._context) - self._start_heading) if standing else 0.0
+
+    def _leave_out_stall(self) -> None:
+        """Let no time count in which this program was stopped: the vehicle may have climbed."""
+        now = asyncio.get_running_loop().time()
+        since_check, self._last_check = now - self._last_check, now
+        if since_check > _SHORTEST_STALL:
+            self._began += since_check
 
     def _was_stopped(self) -> bool:
         """Whether the mode changed from take-off to hold more than `_ARRIVAL_TIMEOUT` ago."""
@@ -205,13 +218,19 @@ class _Climb:
         too_low = height < self._height
         if too_low and climbed_height <= self._height - MAX_UNDERSHOOT:
             return None
-        if not too_low and climbed_height > self._height + _MAX_OVERSHOOT:
+        if not too_low and climbed_height > self._height + MAX_OVERSHOOT:
             return None
         return FlightEnded(
             f"after a climb of {climbed_height:.1f} m the height above home is {height:.1f} m: "
             "home or the height estimate has jumped",
             Exit.LAND,
         )
+
+
+def _heading(context: FlightContext) -> float:
+    """The estimated heading, rad; 0 before the first attitude."""
+    sample = context.loop.resets.newest_attitude
+    return 0.0 if sample is None else heading(sample.q)
 
 
 def _require_ground(context: FlightContext) -> None:

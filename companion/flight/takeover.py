@@ -15,13 +15,20 @@ from companion.flight.preflight_phases import (
     use_evidence,
     wait_until_armed,
 )
-from companion.flight.takeoff import MAX_UNDERSHOOT, climb_has_ended
+from companion.flight.takeoff import (
+    MAX_UNDERSHOOT,
+    climb_has_ended,
+    require_steady_heading,
+)
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
 
 _LARGEST_HELD_SPEED = 3.0
 """Largest horizontal speed of a vehicle that is taken over, m/s."""
+
+_LONGEST_DISTURBANCE = 4.0
+"""Longest time for which a disturbed link delays the takeover before the flight ends, s."""
 
 _BRAKING_TIME = 5.0
 """Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
@@ -138,9 +145,11 @@ def _require_armed_on_ground(context: FlightContext) -> None:
 async def offboard(context: FlightContext) -> None:
     """Check the vehicle again, take over, and hold for `_SETTLE_TIME`."""
     context.waiting_for = "the preflight checks before the takeover"
-    await context.preflight.require(Stage.AIRBORNE)
+    await context.preflight.require_within(_LONGEST_DISTURBANCE, Stage.AIRBORNE)
+    require_steady_heading(context)
     await _wait_until_held(context)
     await _require_learned_hover(context)
+    require_steady_heading(context)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
     position_jump = hypot(*context.loop.resets.position_shift)

@@ -38,7 +38,7 @@ class ReplacementDetector:
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
         self._has_begun = self._arming_noted = False
-        self._peer_count = self._restart_count = 0
+        self._peer_count = self._restart_count = self._timesync_restart_count = 0
         self.uid: str | None = None
         self._other_uid: str | None = None
         self._frame_count = 0
@@ -51,6 +51,7 @@ class ReplacementDetector:
         self.uid = self._other_uid = None
         self._peer_count = self._link.stats.peers
         self._restart_count = self._link.clock.restart_count
+        self._timesync_restart_count = self._link.timesync.restart_count
         self._frame_count, self._updated_at = self._link.stats.frames, self._clock()
         self._silence = self._long_silence = 0.0
 
@@ -103,6 +104,18 @@ class ReplacementDetector:
             raise FlightEnded(reason, Exit.RELEASE)
         raise VehicleReplaced(reason)
 
+    def restart_in_words(self) -> str | None:
+        """A restart that the stamps of the attitude or the TIMESYNC answers show; None: neither.
+
+        ArduPilot sends no attitude after a restart until somebody requests it.
+        """
+        clock, timesync = self._link.clock, self._link.timesync
+        if self._restart_count != clock.restart_count:
+            return f"the autopilot may have restarted: {clock.last_change}"
+        if self._timesync_restart_count != timesync.restart_count:
+            return f"the autopilot may have restarted: {timesync.last_restart}"
+        return None
+
     def _sign_of_replacement(self) -> str | None:
         """The sign of a replacement, in words.
 
@@ -111,7 +124,7 @@ class ReplacementDetector:
         if self._peer_count != self._link.stats.peers:
             return "the vehicle is heard from another address or connection than before"
         if self._restart_count != self._link.clock.restart_count:
-            return f"the autopilot may have restarted: {self._link.clock.last_change}"
+            return self.restart_in_words()
         if self._other_uid is not None:
             return f"another vehicle answers: hardware id {self._other_uid}, not {self.uid}"
         if self._long_silence:

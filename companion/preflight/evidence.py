@@ -62,6 +62,8 @@ class LinkQuality(NamedTuple):
     """Messages of the link about signatures and the peer."""
     timesync_on_other_clock: bool = False
     """Whether TIMESYNC uses another clock than the samples' stamps."""
+    repeated_count: int = 0
+    """Number of frames whose sequence number went back."""
 
     @property
     def loss(self) -> float:

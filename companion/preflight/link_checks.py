@@ -12,18 +12,24 @@ from companion.vehicle.parameter_rules import CheckResult
 
 _UNSAFE_LOSS_SHARE = 0.2
 _MAX_DAMAGED_SHARE = 0.01
+_MAX_REPEATED_SHARE = 0.05
+"""If more frames are lost and repeated, two senders with one id may count them."""
 
 
-def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
+def losses(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Check the link for lost messages, damaged messages and reconnects."""
     link = evidence.link
     lost_share = link.loss
+    fix = "lower link.attitude_rate_hz and link.position_rate_hz, or use a better link"
+    if link.repeated_count > _MAX_REPEATED_SHARE * max(1, link.frame_count):
+        ids = f"{config.link.target_system}/{config.link.target_component}"
+        fix += f"; a gimbal or another device that sends as {ids}, too, needs ids of its own"
     yield Finding(
         Key.LOSS,
         UNSAFE if lost_share > _UNSAFE_LOSS_SHARE else INEFFECTIVE,
         f"{100.0 * lost_share:.1f} % of the vehicle's messages are lost",
         "our setpoints are lost, too, and we see the pilot's mode changes late",
-        "lower link.attitude_rate_hz and link.position_rate_hz, or use a better link",
+        fix,
         "gaps in MAVLink sequence numbers",
     ).safe_unless(lost_share > TOLERABLE_LOSS)
     if link.damaged_count > _MAX_DAMAGED_SHARE * max(1, link.frame_count):

@@ -140,6 +140,7 @@ def _link_quality(link: Link, stats_before: LinkStats, notices: tuple[str, ...])
         jitter=link.timesync.jitter_s,
         notices=notices,
         timesync_on_other_clock=link.clock.delay.why_unknown is DelayUnknown.OTHER_CLOCK,
+        repeated_count=stats_now.repeated - stats_before.repeated,
     )
 
 

@@ -57,6 +57,7 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
     "before the end",
 }
 
+_RESTARTED = "the autopilot may have restarted"
 _USER_CODE = "fix the code named above, and fly it on the mock vehicle (`companion demo`) first"
 
 
@@ -64,10 +65,12 @@ def what_to_do(monitor: str | None, phase: str, result: str = "") -> str:
     """Advice as one sentence without a full stop.
 
     The advice depends on the monitor that ended the flight (None: no monitor), else on the phase
-    that failed; an error in the user's code, named in `result`, has its own advice.
+    that failed; an error in the user's code, or a restart, named in `result`, has its own advice.
     """
     if result.startswith(MESSAGE_START):
         return _USER_CODE
+    if result.startswith(_RESTARTED):
+        return ADVICE_BY_MONITOR["clock"]
     if monitor is not None:
         plugin_advice = f"fix what your own monitor `{monitor}` reported, or change its limit"
         return ADVICE_BY_MONITOR.get(monitor, plugin_advice)

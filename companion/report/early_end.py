@@ -59,7 +59,7 @@ def early_end(
         limit = _fence_side(config, reason, record)
     elif config is not None:
         limit = _constant_limits(config).get(monitor)
-    return EarlyEndMark(early_end_figures["time_s"], reason, limit)
+    return EarlyEndMark(float(early_end_figures["time_s"]), reason, limit)
 
 
 def _constant_limits(config: Config) -> dict[str, CrossedLimit]:

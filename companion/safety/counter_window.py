@@ -17,6 +17,9 @@ _FILLED_SHARE = 0.9
 _LONGEST_READING_INTERVAL = 0.03
 """A longer interval between two readings is a stall, s; the timer's period is 0.02 s."""
 
+_LONG_STALL = 2.0
+"""Shortest stall in which a failsafe may land the vehicle, s."""
+
 
 class _Counters(NamedTuple):
     """The counters at one reading; `late_by`: how late the reading was, s."""
@@ -37,11 +40,16 @@ class CounterWindow:
     Args:
         real_time: whether deadlines and stalls count; in lockstep they do not, because the vehicle
             waits for this program.
+
+    Attributes:
+        long_stall_ended_at: event-loop time of the end of the last stall of 2 s or more, s; −inf
+            without one. A failsafe may have landed the vehicle in such a stall.
     """
 
     def __init__(self, link: Link, record: LoopRecord, *, real_time: bool) -> None:
         self._link, self._record, self._real_time = link, record, real_time
         self._readings: deque[_Counters] = deque()
+        self.long_stall_ended_at = -inf
         self._latest_stall = -inf  # when a late reading was made, s; most flights have none
 
     def clear(self) -> None:
@@ -56,6 +64,8 @@ class CounterWindow:
             late_by = max(0.0, now - readings[-1].now - _LONGEST_READING_INTERVAL)
         if late_by > 0.0:
             self._latest_stall = now
+        if late_by >= _LONG_STALL:
+            self.long_stall_ended_at = now
         readings.append(
             _Counters(
                 now,

@@ -25,6 +25,8 @@ from companion.vehicle.link import Link
 
 _MAX_LAT_LON_AGE = 1.0
 """Largest age of the GLOBAL_POSITION_INT that gives the place where control begins, s."""
+_HOLD_ERROR = 0.3
+"""A vehicle farther from the place of its hold still moves there, m: wind may slow it."""
 _GAP_COUNTING_TIME = 5.0
 """Time over which gaps in the setpoints are counted, s."""
 _RESET_COUNTING_TIME = 30.0
@@ -163,7 +165,8 @@ class SnapshotBuilder:
             self._fence_lat_lon,
             guidance_loop.acceleration,
             guidance_loop.estimate.disturbance,
-            guidance_loop.remaining_braking_time > 0.0,
+            guidance_loop.remaining_braking_time > 0.0
+            or (guidance_loop.tracking_error or 0.0) > _HOLD_ERROR,
         )
 
     def _health(self, now: float) -> Health:

@@ -2,8 +2,7 @@
 
 The offset is vehicle time minus event-loop time. The stamp of an attitude sample minus its arrival
 is the offset minus the sample's delay. So the largest difference (`max_offset`) comes from the
-sample with the smallest delay, the "quickest" sample. TIMESYNC measures the delay of the quickest
-sample.
+sample with the smallest delay, the "quickest" sample. TIMESYNC measures the delay of that sample.
 """
 
 from collections.abc import Callable
@@ -29,6 +28,8 @@ _MIN_CLOCK_SETBACK = 0.5
 """A TIMESYNC time this far behind the newest stamp, s, means that the clock was set back."""
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
+_LONG_GAP = 1.0
+"""After a longer gap, s, an old sample was queued: it says nothing of the clocks' drift."""
 _TIMESYNC_WAIT = 3.0
 """Time from the first sample to the report that TIMESYNC does not measure ages, s."""
 
@@ -101,7 +102,10 @@ class VehicleClock:
         """
         time = time_boot_ms / 1000.0 + self._jump_correction
         offset = time - received
-        max_offset = self._max_offset + self.rate.lowest_rate * (received - self._last_arrival)
+        gap = received - self._last_arrival
+        max_offset = self._max_offset + self.rate.lowest_rate * gap
+        if gap > _LONG_GAP and offset < max_offset:  # queued in a stall of this program
+            max_offset = self._max_offset + self.rate.rate * gap
         fits = time > self._newest_time and offset <= max_offset + SMALLEST_JUMP
         if not fits or self._misfits.stamps:
             misfit = self._fit_stamp(Stamp(time, offset, received), time_boot_ms, max_offset)
@@ -148,11 +152,7 @@ class VehicleClock:
             self._accept_jump(-clock_setback, round(vehicle_ns * 1e-6), set_back=was_set_back)
 
     def update(self, now: float) -> None:
-        """Drop expired TIMESYNC exchanges; report when ages become unknown or known again.
-
-        Args:
-            now: event-loop time, s.
-        """
+        """Drop exchanges too old at event-loop time `now` (s); report a change of `age_known`."""
         self.delay.expire(now)
         if now - self._start_time < _TIMESYNC_WAIT or self.age_known is not self._reported_unknown:
             return

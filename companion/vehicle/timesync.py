@@ -9,6 +9,7 @@ probes show that setpoints come late or are lost.
 import asyncio
 from collections import deque
 from collections.abc import Callable
+from math import inf
 from typing import NamedTuple
 
 from companion.mavlink.dispatcher import MessageDispatcher
@@ -16,10 +17,16 @@ from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.clock_estimates import EXCHANGE_LIFETIME
+from companion.vehicle.clock_jumps import RESTART_SETBACK, describe_change
 
 # The first exchanges follow quickly, so that the clock offset is good after a second.
 _QUICK_EXCHANGES, _QUICK_EXCHANGE_PERIOD_S = 10, 0.1
 _EXCHANGE_PERIOD_S = 1.0
+_JUST_BOOTED = 60.0
+"""Longest time since boot of a vehicle that has just restarted, s; no other clock shows so little.
+"""
+_STALLED_PERIOD_S = 1.5
+"""A longer period, s, is a stall of this program; so long after it, missing answers say nothing."""
 _NS_PER_S, _S_PER_NS = 1e9, 1e-9
 _PROBE_PERIOD_NS = 0.1 * _NS_PER_S
 _UPLINK_WINDOW_NS = 0.7 * _NS_PER_S
@@ -93,6 +100,10 @@ class TimeSync:
     Args:
         clock: returns the event-loop time, s.
         vehicle_clock: takes each exchange of request and answer.
+
+    Attributes:
+        restart_count: counts answers whose time went back to that of a vehicle which just booted.
+        last_restart: the newest of these restarts in words; empty before the first.
     """
 
     def __init__(
@@ -103,6 +114,7 @@ class TimeSync:
         vehicle_clock: VehicleClock,
     ) -> None:
         self._outbox, self._clock, self._vehicle_clock = outbox, clock, vehicle_clock
+        self.restart_count, self.last_restart, self._vehicle_time = 0, "", -inf
         self.reset()
         dispatcher.subscribe("TIMESYNC", self._on_timesync)
 
@@ -117,10 +129,16 @@ class TimeSync:
         for _ in range(_QUICK_EXCHANGES):
             self.send_exchange_request()
             await asyncio.sleep(_QUICK_EXCHANGE_PERIOD_S)
+        stalled_at = -inf
         while True:
             self.send_exchange_request()
+            sent = self._clock()
             await asyncio.sleep(_EXCHANGE_PERIOD_S)
-            self._vehicle_clock.update(self._clock())
+            now = self._clock()
+            if now - sent > _STALLED_PERIOD_S:
+                stalled_at = now
+            if now - stalled_at > _STALLED_PERIOD_S:
+                self._vehicle_clock.update(now)
 
     def send_exchange_request(self) -> None:
         """Send the request of one exchange."""
@@ -175,6 +193,14 @@ class TimeSync:
         elif not self._probes.take_answer(sent_ns, now_ns):  # it answers another station
             return
         self._newest_answered_ns = max(sent_ns, self._newest_answered_ns or 0)
+        self._notice_restart(message.tc1 * _S_PER_NS)
+
+    def _notice_restart(self, vehicle_time: float) -> None:
+        before, self._vehicle_time = self._vehicle_time, vehicle_time
+        if vehicle_time < min(before - RESTART_SETBACK, _JUST_BOOTED):
+            self.restart_count += 1
+            setback = vehicle_time - before
+            self.last_restart = describe_change(setback, before, vehicle_time, set_back=True)
 
     def _recent_round_trips(self) -> list[float]:
         return self._exchanges.round_trips(since_ns=self._now_ns() - EXCHANGE_LIFETIME * _NS_PER_S)

@@ -139,11 +139,14 @@ def test_results_that_cannot_be_read_are_named(begun, capsys):
     campaign, out = begun
     path = store.unit_file(out, 1)
     whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
-    assert main(["campaign", "report", str(out)]) == 2
-    said = capsys.readouterr().err
-    assert f"{path}: cannot be read: " in said
-    assert "; delete this file and continue the campaign" in said
+    metadata_size = int.from_bytes(whole[-8:-4], "little")
+    blank_metadata = whole[: -8 - metadata_size] + bytes(metadata_size) + whole[-8:]
+    for damaged in (whole[: len(whole) // 2], blank_metadata):
+        path.write_bytes(damaged)
+        assert main(["campaign", "report", str(out)]) == 2
+        (said,) = capsys.readouterr().err.splitlines()
+        assert f"{path}: cannot be read: " in said
+        assert "; delete this file and continue the campaign" in said
     with pytest.raises(ConfigError, match=r"unit-00001.*cannot be read"):
         again._stored_row(out, campaign, SimpleNamespace(unit=1), 1)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)

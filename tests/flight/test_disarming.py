@@ -78,3 +78,15 @@ def test_motors_that_somebody_stops_in_the_air_end_no_good_flight(autopilot, pha
         height = -mock.state()["position"][2]
     assert summary.result == result, summary.events
     assert height > 1.0
+
+
+def test_a_vehicle_that_another_program_armed_first_is_not_said_to_be_disarmed_by_us():
+    """Two programs that were started within a second; the other one flies on."""
+    with mock_vehicle() as mock:
+        rival = When("arm", lambda: mock.command(ARM, 1.0))
+        summary = fly(mock, None, rival)
+        assert mock.state()["armed"]
+    assert summary.result == "the vehicle is already armed; land and disarm it first"
+    texts = [text for _, text in summary.events]
+    assert "disarming" not in texts
+    assert texts[-1] == "leaving the vehicle as it is"

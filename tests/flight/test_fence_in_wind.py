@@ -15,11 +15,12 @@ from tests.flight.fly import QuickVehicle, quick_flight
 RADIUS = 8.0
 
 
-def farthest_downwind(autopilot, wind, max_tilt):
+def farthest_downwind(autopilot, wind, max_tilt, **safety):
     """A program flies downwind until the fence ends it; the largest distance in each mode, m."""
     vehicle = QuickVehicle(autopilot, wind={"speed_m_s": wind, "from_deg": 180.0})
     limits = {"fence_radius_m": RADIUS, "max_tilt_deg": max_tilt}
-    config = quick_flight(autopilot, {"limits": limits, "flight": {"takeoff_height_m": 5.0}})
+    changes = {"limits": limits, "flight": {"takeoff_height_m": 5.0}, "safety": safety}
+    config = quick_flight(autopilot, changes)
     distance = {"LAND": [0.0]}
 
     async def flown():
@@ -56,6 +57,11 @@ def test_the_landing_does_not_drift_out_of_the_fence(autopilot, control):
 def test_a_wind_that_needs_most_of_the_tilt_does_not_blow_it_out_of_the_fence(wind, max_tilt):
     """The vehicle left it by 0.9 m, braking as if all of the tilt were free."""
     assert max(farthest_downwind("px4", wind, max_tilt).values()) < RADIUS
+
+
+def test_a_hold_that_has_time_ends_only_where_the_vehicle_has_come_upwind():
+    """Only 0.4 m/s² were left against the wind: 1 m behind the hold, it was landed and left."""
+    assert max(farthest_downwind("px4", 6.5, 35.0, hold_s=10.0).values()) < RADIUS - 0.5
 
 
 @pytest.mark.parametrize(

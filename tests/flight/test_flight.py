@@ -33,6 +33,8 @@ class Bench:
         self.context = SimpleNamespace(
             config=SimpleNamespace(flight=None),
             link=SimpleNamespace(autopilot=None, state=SimpleNamespace(forget=lambda: None)),
+            loop=SimpleNamespace(taking_over=False, offboard_active=False),
+            must_disarm=False,
             guidance_loop=SimpleNamespace(run=lambda: asyncio.sleep(60.0)),
             ground=SimpleNamespace(standing=False),
             replacement_detector=SimpleNamespace(begin=self.begin),

@@ -93,6 +93,19 @@ def test_a_vehicle_held_too_low_is_not_taken_over(autopilot):
 
 
 @BOTH
+def test_a_vehicle_refused_before_its_takeover_is_left_in_the_mode_of_its_pilot(autopilot):
+    """Nothing was taken yet, so nothing is commanded."""
+    mock = in_the_air(autopilot)
+    mode = mock.state()["mode"]
+    wrong_thrust = {"thrust": {"hover_thrust": 0.2, "correction_limit": 0.1}}
+    summary = testing.fly(changed(handed_over(autopilot), wrong_thrust, "test"), mock)
+    assert (summary.phase, summary.events[-1][1]) == ("offboard", "leaving the vehicle as it is")
+    assert "hover" in summary.result
+    mock.run(1.0)  # a command may be on its way
+    assert (mock.state()["mode"], mock.setpoints) == (mode, [])
+
+
+@BOTH
 def test_the_pilot_takes_it_back_at_any_time(autopilot):
     mock = in_the_air(autopilot)
     mock.when(lambda: obeyed(mock), lambda: mock.at(mock.time + 1.5, mock.take_over))

@@ -179,3 +179,23 @@ def test_a_vehicle_heard_again_after_its_take_off_without_a_position_is_told_to_
         "the vehicle is heard again, armed in AUTO.LOITER, after 10 s without a fresh position: "
         "nothing is commanded"
     )
+
+
+@pytest.mark.parametrize(("phase", "arm"), [("arm", False), ("maneuvers", True)])
+def test_a_vehicle_that_comes_back_under_another_system_id_is_named(phase, arm):
+    """The wait was said to be for its pilot, who had armed it, or for any frame."""
+    beat = dialect.MAVLink_heartbeat_message(2, 12, 29, 0x03040000, 3, 3)
+    packer = dialect.MAVLink(None, 2, 1)
+    with mock_vehicle() as mock:
+
+        def come_back():
+            mock.to_companion = lambda _: [bytes(beat.pack(packer))]
+
+        change = When(phase, come_back, after=1.0)
+        flight = {"arm": arm, "arming_timeout_s": 8.0}
+        summary = fly(mock, None, change, flight=flight, hover={"duration_s": 9.0})
+    texts = [text for _, text in summary.events]
+    assert any(
+        text.endswith("; system 2 is heard, but link.target_system is 1") for text in texts
+    ), texts
+    assert not any("the pilot to arm" in text for text in texts)

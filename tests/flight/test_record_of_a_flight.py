@@ -10,7 +10,7 @@ import pytest
 from pymavlink import mavutil
 
 from companion.flight.observer import SilentObserver
-from companion.recording.closing_words import closing_words
+from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.flight_record import read_flight
 from companion.recording.folder import space_warning
 from companion.testing import fly
@@ -202,6 +202,15 @@ def test_a_failure_of_the_recording_at_its_close_is_an_event(tmp_path, monkeypat
         [each["text"] for each in written["events"]],
     ):
         assert [text for text in texts if "recording stopped: No space left" in text] == texts[-1:]
+
+
+def test_a_folder_that_was_removed_in_flight_is_not_named_at_the_end(tmp_path):
+    vehicle, folder = QuickVehicle(), tmp_path / "flight"
+    vehicle.when(lambda: vehicle.state()["armed"], lambda: shutil.rmtree(folder))
+    summary = fly(merged(QUICK_FLIGHT, {"hover": {"duration_s": 0.5}}), vehicle, folder)
+    assert (summary.result, summary.log) == ("ok", None)
+    invocation = Invocation("companion", ["fly"], None)
+    assert closing_words(summary.as_dict(), invocation).next_command is None
 
 
 def test_height_and_speed_are_unknown_when_no_position_comes():

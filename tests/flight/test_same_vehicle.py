@@ -16,6 +16,7 @@ class Link(SimpleNamespace):
         super().__init__(
             now=0.0,
             stats=SimpleNamespace(peers=0, frames=0),
+            timesync=SimpleNamespace(restart_count=0),
             clock=SimpleNamespace(restart_count=0, last_change="its clock went back by 40.0 s"),
         )
         self.vehicle = ReplacementDetector(self, lambda: self.now)

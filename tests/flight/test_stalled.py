@@ -43,6 +43,44 @@ def test_px4_that_its_failsafe_has_taken_and_landed_in_a_stall_is_not_taken_back
     assert summary.events[-1][1] == "the autopilot's failsafe took over: mode AUTO.RTL"
 
 
+def test_px4_that_landed_while_the_full_buffer_dropped_its_reports_is_not_told_as_falling():
+    """The kernel keeps the oldest datagrams: of the landing the program reads only the end."""
+    with mock_vehicle(delay_s=0.015, parameters={"COM_OBL_RC_ACT": 4}) as mock:
+
+        def lose_reports():
+            mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 19.95})
+
+        summary = stalled_at(
+            mock, "maneuvers", 20.0, 1.0, then=lose_reports, hover={"duration_s": 9.0}
+        )
+        truth = mock.state()
+    texts = [text for _, text in summary.events]
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False), texts
+    assert texts[-1] == "the vehicle stands on the ground, disarmed: it landed or fell unwatched"
+    accusations = ("does not answer TIMESYNC", "comes too rarely")
+    assert not any(words in text for text in texts for words in accusations), texts
+
+
+@pytest.mark.parametrize("phase", ["takeoff", "offboard", "hand back"])
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_stall_longer_than_the_time_of_a_phase_is_not_told_as_a_fault_of_the_vehicle(
+    autopilot, phase
+):
+    """It has climbed, waits to be taken over, or holds: so the flight goes on."""
+    parameters = {"px4": {"COM_OF_LOSS_T": 30.0}, "ardupilot": {}}[autopilot]
+    accepted = {"flight": {"accept": ["COM_OF_LOSS_T"]}, "hover": {"duration_s": 0.5}}
+    with mock_vehicle(autopilot=autopilot, delay_s=0.015, parameters=parameters) as mock:
+
+        def lose_reports():
+            mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 19.95})
+
+        after = 0.05 if phase == "hand back" else 1.0
+        summary = stalled_at(mock, phase, 20.0, after, then=lose_reports, **accepted)
+        truth = mock.state()
+    assert summary.result == "ok", summary.events
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
+
+
 def test_a_stall_during_the_take_off_does_not_leave_the_vehicle_in_the_air():
     """The heartbeats of the stall are read after it: the vehicle was not silent, we were."""
     summary, truth = stalled("ardupilot", 1.5, "takeoff")

@@ -168,6 +168,11 @@ def boots_again(silence=4.5, uid=7, port=False):
     return act
 
 
+def restarts(silence):
+    """The autopilot restarts, as after a dip of its supply: disarmed, in its first mode."""
+    return together(boots_again(silence), disarms, switches("STABILIZE"))
+
+
 ON_GROUND, IN_AIR = {"landed_state": 1}, {"landed_state": 2}
 
 

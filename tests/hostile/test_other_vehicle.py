@@ -5,8 +5,8 @@ import time
 from pymavlink.dialects.v20 import common
 
 from tests.hostile import personality as kinds
-from tests.hostile.actions import arms, boots_again, switches
-from tests.hostile.endings import never_took_over, ok, says, stops_within
+from tests.hostile.actions import arms, boots_again, restarts, switches
+from tests.hostile.endings import failed, never_says, never_took_over, ok, says, stops_within
 from tests.hostile.flying import fly_over_sockets
 from tests.hostile.judge import commands, judge
 from tests.hostile.personality import ARDUPILOT, PX4
@@ -73,6 +73,25 @@ IN_FLIGHT = (
 )
 
 
+SILENT = (
+    ("in air", 0.4, 0.0),
+    ("in control", 0.5, 0.0),
+    ("in control", 0.5, 0.3),
+    ("in control", 0.5, 1.5),
+    ("landing", 0.3, 0.3),
+)
+TOLD_AS_A_RESTART = [
+    Scenario(
+        f"it restarts {delay} s after it is {mark}, silent for {silence} s, and sends heartbeats",
+        ((mark, delay, restarts(silence)),),
+        (failed, says("the autopilot restarted"), never_says("the pilot or another")),
+        (ARDUPILOT,),
+        rules=RESTARTED,
+    )
+    for mark, delay, silence in SILENT
+]
+
+
 @flights([scenario for kind in kinds.BOTH for scenario in on_the_ground(kind)])
 def test_a_vehicle_that_was_not_checked_is_not_flown(scenario, kind, tmp_path):
     scenario.fly(kind, tmp_path)
@@ -81,6 +100,15 @@ def test_a_vehicle_that_was_not_checked_is_not_flown(scenario, kind, tmp_path):
 @flights(IN_FLIGHT)
 def test_a_restart_in_flight_ends_it(scenario, kind, tmp_path):
     scenario.fly(kind, tmp_path)
+
+
+@flights(TOLD_AS_A_RESTART)
+def test_an_autopilot_that_restarts_disarmed_is_told_as_a_restart_not_as_its_pilot(
+    scenario, kind, tmp_path
+):
+    """ArduPilot sends no attitude until somebody requests it: TIMESYNC shows the new clock."""
+    flown = scenario.fly(kind, tmp_path)
+    assert not flown.result.startswith("the vehicle disarmed")
 
 
 def test_datagrams_of_a_stranger_before_the_vehicle_speaks(tmp_path):

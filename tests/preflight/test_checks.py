@@ -116,6 +116,14 @@ def test_what_is_lost_on_the_way(quality, key, verdict):
     assert found(link_checks.losses, evidence) == ({key: verdict} if key else {})
 
 
+@pytest.mark.parametrize(("repeated", "told"), [(40, False), (60, True)])
+def test_a_second_device_with_the_ids_of_the_vehicle_looks_like_a_lossy_link(repeated, told):
+    """A gimbal as 1/1: its own sequence numbers go to and fro between those of the vehicle."""
+    link = QUALITY._replace(frame_count=1000, lost_count=400, repeated_count=repeated)
+    (loss, *_) = link_checks.losses(CONFIG, replace(GOOD, link=link))
+    assert ("another device that sends as 1/1" in loss.fix) is told
+
+
 @pytest.mark.parametrize(
     ("quality", "pause", "expected"),
     [

@@ -70,6 +70,7 @@ def record(folder, *, steps=False, motion=False, gain="5.0", largest=2.0, summar
         ({"largest": 1e300}, "motion: not a valid record of a flight: a number is above 1e+09"),
         ({"gain": "0"}, "damaged .*division by zero"),
         ({"gain": "x"}, "damaged .*could not convert"),
+        ({"summary": {**WHOLE, "early_end": {"monitor": None, "time_s": None}}}, "damaged"),
         ({"summary": {**WHOLE, "early_end": 3}}, "damaged .*rename its summary.json"),
     ],
 )

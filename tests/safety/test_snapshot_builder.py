@@ -130,6 +130,12 @@ def test_motion_is_seen_from_where_control_began(flight):
     )
 
 
+@pytest.mark.parametrize(("error", "moves"), [(None, False), (0.29, False), (0.31, True)])
+def test_a_vehicle_that_wind_keeps_from_its_hold_still_moves_there(flight, error, moves):
+    flight.guidance.remaining_braking_time, flight.guidance.tracking_error = 0.0, error
+    assert flight.snapshot().motion.moves_to_hold is moves
+
+
 def test_the_fence_may_have_another_centre_than_where_control_began(flight):
     flight.builder.begin(10.0, FenceCentre((4.0, 5.0, -6.0), LatLon(46.0, 7.0)))
     assert flight.builder.fence_centre_without_resets().lat_lon == LatLon(46.0, 7.0)
@@ -140,7 +146,7 @@ def test_the_fence_may_have_another_centre_than_where_control_began(flight):
 @pytest.mark.parametrize("command", [None, SimpleNamespace(idle=True)])
 def test_what_is_not_known_is_none(command):
     flight = Flight()
-    flight.guidance.motion = None
+    flight.guidance.motion = flight.guidance.tracking_error = None
     flight.state.global_position.received = 8.99
     flight.builder.begin(10.0)
     flight.listen(10.0)
@@ -148,7 +154,7 @@ def test_what_is_not_known_is_none(command):
     flight.loop.command = command
     flight.guidance.fresh_position = lambda: None
     told = flight.snapshot()
-    assert told.motion == Motion(height=12.5, tracking_error=0.9)
+    assert told.motion == Motion(height=12.5)
     assert (told.control.last_position_arrival, told.control.position_fresh) == (-inf, False)
     flight.guidance.motion = Motions((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     assert flight.snapshot().motion[2:4] == (None, (4.0, 5.0, 6.0))

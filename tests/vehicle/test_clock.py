@@ -226,6 +226,22 @@ def test_a_restart_tells_the_time_since_boot_before_and_after_whatever_the_clock
     assert (link.clock.change_count, link.clock.restart_count) == (2, 2)
 
 
+@pytest.mark.parametrize("timesync", [True, False])
+@pytest.mark.parametrize("flown", [4.0, 30.0])
+def test_samples_that_were_queued_in_a_stall_of_20_s_are_no_jump_of_the_clock(flown, timesync):
+    """The socket's buffer holds those of the first seconds; the next ones are new."""
+    link = Link(timesync=timesync).run(flown)
+    stall_end = link.received = link.now + 20.0
+    for _ in range(500):
+        link.vehicle += 0.004
+        link.arrive(link.vehicle)
+    link.vehicle, link.now = link.vehicle + 18.0, stall_end
+    link.run(3.0)
+    assert not any("clock" in text for text in link.told), link.told
+    assert link.clock.change_count == 0
+    assert link.ages[-1] < STALE
+
+
 def test_before_the_first_sample_no_age_is_known_and_no_stamp_is_ahead():
     clock = VehicleClock()
     assert (clock.offset, clock.age(5.0, 10.0)) == (None, None)
