@@ -154,7 +154,10 @@ def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
 
     Raises:
         RuntimeError: an event loop runs already, as in a notebook.
+        ValueError: `main` is no coroutine.
     """
+    if not asyncio.iscoroutine(main):
+        raise ValueError(f"a coroutine was expected, as in companion.run(main()), not {main!r}")
     running_loop: asyncio.AbstractEventLoop | None = None
     with suppress(RuntimeError):
         running_loop = asyncio.get_running_loop()

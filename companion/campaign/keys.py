@@ -50,6 +50,10 @@ def check_key(key: str, base: Config, place_text: str) -> None:
         raise ConfigError(f"{place_text}: `{key}`: campaigns fly without signing; take it out")
     if section == "mock":
         _check_mock_key(name, base.mock or {}, place_text)
+    elif section not in Config.model_fields and section in mock_with_defaults(base.mock or {}):
+        raise ConfigError(
+            f"{place_text}: there is no section `{section}`; did you mean mock.{key}?"
+        )
     elif name not in getattr(type(getattr(base, section, None)), "model_fields", ()):
         # This raises the error that names the nearest key, if there is one.
         validated({section: {name: 0.0}}, place_text, Config)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from companion.cli import tool_options
 from companion.cli.campaign_options import add_campaign, with_campaign_run
+from companion.cli.hinting_parser import HintingParser
 from companion.cli.options import (
     Commands,
     add_endpoint,
@@ -38,7 +39,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = HintingParser(
         prog="companion",
         description=(
             "Fly a PX4 or ArduPilot multirotor by body rates, with a linear acceleration response."

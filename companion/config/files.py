@@ -14,6 +14,7 @@ from companion.config.root import MOST_INCLUDED
 from companion.config.trajectory_file import is_table
 from companion.files import bounded_yaml, yaml_file
 from companion.files.bounded_yaml import KeyPath
+from companion.files.similar_names import name_hint
 from companion.files.value_faults import shortened_text
 from companion.files.yaml_faults import dotted_keys
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
@@ -203,8 +204,7 @@ def with_assignments(config: Config, assignments: Sequence[str]) -> Config:
     """The configuration changed by texts such as `limits.max_tilt_deg=20`, with values in YAML.
 
     Raises:
-        ConfigError: a text does not have this form, its section is unknown or `mock`, or the result
-            is not valid.
+        ConfigError: a text has another form, an unknown section or `mock`, or an invalid value.
     """
     changes: dict[str, dict[str, Any]] = {}
     for text in assignments:
@@ -215,7 +215,8 @@ def with_assignments(config: Config, assignments: Sequence[str]) -> Config:
         if not (equals_sign and dot and section and name):
             raise ConfigError(f"--set {text}: write SECTION.KEY=VALUE, as limits.max_tilt_deg=20")
         if section not in Config.model_fields:
-            raise ConfigError(f"--set {text}: there is no section `{section}`")
+            hint = name_hint(section, Config.model_fields)
+            raise ConfigError(f"--set {text}: there is no section `{section}`{hint}")
         if section == "mock":
             raise ConfigError(
                 f"--set {text}: --set cannot change the section `mock`, because the mock vehicle "

@@ -115,9 +115,9 @@ class SafetyConfig(Section):
             require_known_name("monitor", name, (), plugins.MONITORS)
         if self.fence_polygon_m and self.fence_polygon_deg:
             raise ValueError("give fence_polygon_m or fence_polygon_deg, not both")
-        for corners in (self.fence_polygon_m, self.fence_polygon_deg):
-            if 0 < len(corners) < 3:
-                raise ValueError("a polygon has at least three corners")
+        for key in ("fence_polygon_m", "fence_polygon_deg"):
+            if 0 < len(getattr(self, key)) < 3:
+                raise ValueError(f"{key} must have at least three corners, or none")
         if self.fence_polygon_m and not inside(0.0, 0.0, self.fence_polygon_m):
             raise ValueError(
                 "fence_polygon_m must surround [0, 0], the point where control begins; "

@@ -88,6 +88,7 @@ def facts_of(
         armed=state.armed,
         mode=state.mode,
         silence=_silence_duration(context, now),
+        tilt=context.tilt(),
         battery=(reporter.battery_at_takeoff, battery_at_end),
         min_battery=config.limits.min_battery,
         max_tilt=config.limits.max_tilt,

@@ -1,6 +1,8 @@
 """The configured maneuvers, made and checked before the flight, with notes about a trajectory."""
 
+from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -18,9 +20,14 @@ from companion.guidance import Corners, Doublets, Maneuver, ManeuverSequence, St
 from companion.guidance.follow import Follow, circle, hover
 from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory, slow_down, violations
 from companion.guidance.trajectory.demand import Motion, sampled_motion
-from companion.guidance.trajectory.feasibility import TILT_LIMIT
+from companion.guidance.trajectory.feasibility import TILT_LIMIT, TILT_RATE_LIMIT
 
 _MOST_PARTS_SHOWN = 4
+_SMOOTHER_REMEDY = (
+    "if the table's speed jumps, as at a corner, smooth it more instead: name it in a YAML file "
+    "with csv.cutoff_hz: 1 (docs/trajectories.md)"
+)
+_LIMITS_OF_SMOOTHNESS = (TILT_LIMIT, TILT_RATE_LIMIT)
 
 
 def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> ManeuverSequence:
@@ -103,12 +110,23 @@ def _follow(config: Config, drag: KnownDrag) -> Follow:
             reserve = config.flight.slow_down_reserve_m_s2
             notes = (*notes, *slow_down_notes(trajectory, slower, reserve))
             trajectory = slower.trajectory
+            if _is_rough_table(path, [part.limit for part in slower.parts]):
+                notes = (*notes, f"{trajectory.name}: {_SMOOTHER_REMEDY}")
         elif found_violations := violations(trajectory, envelope):
             first_violation = min(found_violations, key=lambda one: one.slowing_helps)
             assumption = drag.assumption if first_violation.slowing_helps else ""
-            raise ConfigError(f"{path}: {first_violation}; {first_violation.remedy}{assumption}")
+            text = f"{path}: {first_violation}; {first_violation.remedy}{assumption}"
+            is_rough = _is_rough_table(path, [first_violation.limit])
+            raise ConfigError(f"{text}; {_SMOOTHER_REMEDY}" if is_rough else text)
     notes = (*notes, overview(trajectory))
     return Follow(trajectory, config.limits.max_yaw_rate, notes)
+
+
+def _is_rough_table(path: Path, broken_limits: Iterable[str]) -> bool:
+    """Whether more smoothing than by the default may keep the limits that a trajectory breaks."""
+    return trajectory_file.is_table(path) and not set(_LIMITS_OF_SMOOTHNESS).isdisjoint(
+        broken_limits
+    )
 
 
 def overview(trajectory: Trajectory) -> str:
@@ -157,7 +175,8 @@ def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> 
         for part in slow_down.parts[:_MOST_PARTS_SHOWN]
     )
     more_count = len(slow_down.parts) - _MOST_PARTS_SHOWN
-    parts += f"; and in {more_count} more parts" if more_count > 0 else ""
+    if more_count > 0:
+        parts += f"; and in {more_count} more {'part' if more_count == 1 else 'parts'}"
     return f"{before.name} is slowed down to keep its limits: {parts}", result
 
 
@@ -168,7 +187,7 @@ def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) ->
         reserve_text = f" (minus flight.slow_down_reserve_m_s2: {reserve:g})"
     return (
         f"{part.limit or 'a limit'}{reserve_text} at {part.time:.1f} s "
-        f"({north:.1f} m north, {east:.1f} m east, {0.0 - down:.1f} m up)"
+        f"({north:z.1f} m north, {east:z.1f} m east, {-down:z.1f} m up)"
     )
 
 

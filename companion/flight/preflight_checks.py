@@ -67,6 +67,7 @@ class PreflightChecks:
         self._evidence: Evidence | None = None
         self._gathered_at = -inf
         self._noted_texts: set[str] = set()
+        self._warned_keys: set[str] = set()
 
     async def ask_for_telemetry(self) -> None:
         """Request the telemetry that a flight needs, and report rates that the autopilot refuses.
@@ -176,10 +177,16 @@ class PreflightChecks:
         warnings = [
             finding.key
             for finding in findings
-            if finding.result is CheckResult.INEFFECTIVE and finding not in blocking
+            if finding.result is CheckResult.INEFFECTIVE
+            and finding not in blocking
+            and finding.key not in self._warned_keys
         ]
         if warnings:
-            self._note_once(f"preflight warnings: {', '.join(warnings)}; see `companion doctor`")
+            self._warned_keys.update(warnings)
+            self._note_once(
+                f"preflight warnings: {', '.join(warnings)}; `companion doctor` says what to set, "
+                "docs/troubleshooting.md explains each"
+            )
         for finding in unsafe_findings(findings):
             if finding not in blocking:
                 self._note_once(f"unsafe, but accepted by flight.accept: {finding.sentence()}")

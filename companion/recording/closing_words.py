@@ -22,7 +22,10 @@ from companion.recording.what_to_do import what_to_do
 
 _PHASES_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm", "hand over")
 _SHARED_OPTIONS = ("--endpoint", "--set")
-_SLOW_COMPUTER_MONITORS = ("deadlines", "starvation")
+_SLOW_COMPUTER_MONITORS = ("deadlines", "starvation", "answer gaps", "answer rate")
+"""Monitors that a slow computer breaches if the vehicle runs on the same computer."""
+_LYING_TILT_DEG = 40.0
+"""Tilt beyond which a disarmed vehicle does not stand on its legs, °."""
 STOPPED_BY_USER = "stopped at once by the user"
 """Result of a flight that was cancelled, for example by Ctrl-C in a user's program."""
 _INTERRUPTED = ("interrupted by ", STOPPED_BY_USER)
@@ -169,7 +172,13 @@ def _vehicle_state_text(figures: Figures) -> str:
     when_text = "now" if silence is None else f"when last heard, {silence:.1f} s before the end"
     armed = {True: "ARMED", False: "disarmed", None: "not known whether armed"}[state["armed"]]
     mode = "" if state["mode"] is None else f", in mode {state['mode']}"
-    return f"vehicle {when_text}: {armed}{mode}"
+    tilt = state.get("tilt_deg") or 0.0  # an older summary has none
+    lies = state["armed"] is False and tilt > _LYING_TILT_DEG
+    damage = (
+        f", tilted by {tilt:.0f}°: it tipped over or crashed; pull the battery's plug before you "
+        "touch it"
+    )
+    return f"vehicle {when_text}: {armed}{mode}{damage if lies else ''}"
 
 
 def _next_command(figures: Figures, invocation: Invocation) -> str | None:

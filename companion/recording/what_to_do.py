@@ -48,7 +48,7 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
     "arm": "fix what the autopilot names in the events; --arm lets the program arm",
     "hand over": "fly at flight.takeoff_height_m or higher, and switch to the mode that holds",
     "takeoff": "read the autopilot's messages in the events; the pilot may have taken over",
-    "offboard": "fix what the message names; the autopilot must accept our setpoints",
+    "offboard": "fix what the message names; read the autopilot's messages in the events",
     "maneuvers": "read the events before the end; if the pilot took over, nothing needs fixing",
     "hand back": "read the events before the end; the pilot may have taken over",
     "listen": ADVICE_BY_MONITOR["unheard"],

@@ -41,9 +41,12 @@ def draw_history(panels: Sequence["Axes"], flight: FlightData) -> None:
             axes.axvspan(span.begin, span.end, color=_MANEUVER_COLOURS[number % 2], linewidth=0)
         for phase in flight.phases:
             axes.axvline(phase.begin, color=_PHASE_COLOUR, linewidth=0.6, linestyle=":")
-        if name in flight.curves:
-            curve = flight.curves[name]
+        curve = flight.curves.get(name)
+        if curve is not None and np.isfinite(curve.values[:, column]).any():
             axes.plot(curve.time, curve.values[:, column], color=_LINE_COLOUR, linewidth=1.2)
+        else:  # an empty axis would show invented numbers, even negative errors
+            axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", va="center")
+            axes.set_yticks([])
         if flight.early_end is not None:
             axes.axvline(flight.early_end.time, color=_END_COLOUR, linewidth=1.5)
         axes.set_ylabel(title)

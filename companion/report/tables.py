@@ -156,7 +156,7 @@ def _maneuver_table(figures: Any) -> Table:
     columns = (
         ("name", "maneuver", "{}"),
         ("duration_s", "duration, s", "{:.1f}"),
-        ("reference_speed_max_m_s", "largest speed of the reference, m/s", "{:.1f}"),
+        ("reference_speed_max_m_s", "speed of the reference, 95th percentile, m/s", "{:.1f}"),
         ("level_rms_m", "horizontal RMS, m", "{:.3f}"),
         ("level_max_m", "horizontal max, m", "{:.3f}"),
         ("height_rms_m", "height RMS, m", "{:.3f}"),

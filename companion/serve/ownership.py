@@ -27,12 +27,15 @@ class Program(NamedTuple):
 
 
 class ControlState(Enum):
-    """State of the control that the owner (the program in control) has over the vehicle."""
+    """State of the control that the owner (the program in control) has over the vehicle.
+
+    Messages show a value after the name of the owner.
+    """
 
     FREE = "no client is in control"
-    LIVE = "the owner's setpoints are flown"
-    HOLDING = "the owner is silent, and the vehicle is held"
-    EXPIRED = "the owner was silent for too long, and the vehicle is handed back"
+    LIVE = "its setpoints are flown"
+    HOLDING = "it sends no valid setpoint, and the vehicle is held"
+    EXPIRED = "it sent no valid setpoint for too long, and the vehicle is handed back"
 
 
 @dataclass

@@ -55,6 +55,7 @@ class ArduPilot:
         middleware_sw_version=0,
         os_sw_version=0,
         flight_custom_version=tuple(b"12f6aa4e"),
+        uid2=tuple(b"3d1219c7c4c5404aa\0"),  # ArduPilot's simulator tells its computer's id there
     )
 
     def slot_period_us(self, settings: VehicleSettings) -> int:

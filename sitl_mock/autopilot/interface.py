@@ -31,6 +31,10 @@ class Identity(NamedTuple):
     middleware_sw_version: int
     os_sw_version: int
     flight_custom_version: tuple[int, ...]
+    board_version: int = 0
+    uid: int = 0
+    """Hardware id; 0: only `uid2` tells it."""
+    uid2: tuple[int, ...] = (0,) * 18
 
 
 class VehicleParts(NamedTuple):

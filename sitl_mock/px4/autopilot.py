@@ -91,6 +91,8 @@ class Px4:
         middleware_sw_version=18022464,
         os_sw_version=101854463,
         flight_custom_version=(0, 0, 0, 245, 216, 154, 203, 253),
+        board_version=1,
+        uid=5283920058631409231,
     )
 
     def with_defaults(self, section: dict[str, Any]) -> dict[str, Any]:

@@ -184,6 +184,16 @@ def test_a_connection_that_is_dropped_in_flight_is_told_in_words():
     assert mock.state()["mode"] == "LOITER"
 
 
+def test_run_of_a_function_that_was_not_called_says_what_to_write_instead():
+    """It raised AttributeError: 'function' object has no attribute 'close'."""
+
+    async def main():
+        raise AssertionError
+
+    with pytest.raises(ValueError, match=r"as in companion\.run\(main\(\)\), not <function"):
+        companion.run(main)
+
+
 async def test_run_in_a_running_loop_says_what_to_write_instead():
     """Python spoke of loops and left "coroutine was never awaited" behind."""
     with pytest.raises(RuntimeError, match=r"write `await main\(\)`"):

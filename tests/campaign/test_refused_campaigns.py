@@ -63,6 +63,12 @@ def test_a_fault_that_is_none(tmp_path, told, words):
     assert words in refusal(tmp_path, samples=2, **{"faults": faults, **told})
 
 
+def test_a_key_of_the_mock_vehicle_without_its_prefix(tmp_path):
+    """It read: `wind` is not a known key; did you mean `include`?"""
+    said = refusal(tmp_path, sweep={WIND.removeprefix("mock."): [2, 4]})
+    assert f"there is no section `wind`; did you mean {WIND}?" in said
+
+
 def test_a_key_that_two_factors_change(tmp_path):
     gusts = {"values": [0, 1], "keys": [WIND]}
     said = refusal(tmp_path, sweep={WIND: [2, 4], "gusts": gusts}, samples=2)

@@ -39,6 +39,32 @@ def test_a_number_that_is_none_is_wrong_usage(command, number, capsys):
     assert f"{command[-1]}: must be a number from" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("typed", "told"),
+    [
+        ("demo --manouvers hover", "demo: error: unrecognized arguments: --manouvers hover; did "),
+        ("demo --manouvers=hover", "you mean --maneuvers?"),
+        ("demo my.yaml", "demo: error: unrecognized arguments: my.yaml; did you mean --config my."),
+        ("fly --arm my.yaml", "required: --config; did you mean --config my.yaml?"),
+        ("identify my.yml", "--log is required; did you mean --config my.yml?"),
+        ("fly --trajectory a.yaml", "arguments are required: --config\n"),
+        ("fly my.yaml --set", "--set: expected one argument\n"),
+        ("bench link --secnds 3", "bench link: error: unrecognized arguments: --secnds 3; did you"),
+        ("plot one two.yaml", "plot: error: unrecognized arguments: two.yaml\n"),
+        ("demo --xyz", "unrecognized arguments: --xyz\n"),
+    ],
+)
+def test_an_argument_that_a_command_does_not_take_gets_the_usage_of_that_command(
+    typed, told, capsys
+):
+    with pytest.raises(SystemExit) as ending:
+        main(typed.split())
+    error = capsys.readouterr().err
+    assert ending.value.code == 2
+    assert told in error
+    assert error.startswith(f"usage: companion {typed.split()[0]} ")
+
+
 @pytest.mark.parametrize("number", [*NO_NUMBERS, "0.5"])
 @pytest.mark.parametrize("option", ["--speed", "--seed", "--port", "--gcs-port", "--count"])
 def test_the_vehicle_refuses_numbers_that_are_none(option, number, capsys):

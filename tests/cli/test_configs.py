@@ -1,6 +1,7 @@
 """The shipped configurations: complete, correct, and described by the shipped schema."""
 
 import errno
+import itertools
 import os
 import shlex
 from pathlib import Path
@@ -231,13 +232,39 @@ def test_a_refused_path_names_the_key_that_every_command_takes(tmp_path, capsys)
     assert main(["check-config", str(path), "--set", "flight.slow_down=true"]) == 0
 
 
+def test_a_table_whose_speed_jumps_may_be_smoothed_more(tmp_path, capsys):
+    """With the default cutoff the corners of this square take 20 times the allowed rate."""
+    legs = [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0)]
+    points = [(0, 0)] * 20
+    for (x, y), (next_x, next_y) in itertools.pairwise(legs):
+        shares = [step / 20 for step in range(1, 21)]
+        points += [(x + s * (next_x - x), y + s * (next_y - y)) for s in shares]
+        points += [(next_x, next_y)] * 20
+    rows = [f"{0.1 * row:.1f},{x},{y},0" for row, (x, y) in enumerate(points)]
+    (tmp_path / "square.csv").write_text("\n".join(["t,x,y,z", *rows]))
+    (tmp_path / "smooth.yaml").write_text("csv: {file: square.csv, cutoff_hz: 1}")
+    config = tmp_path / "a.yaml"
+    check = ["check-config", str(config), "--set", "flight.maneuvers=[trajectory]", "--set"]
+    config.write_text("vehicle: {lag_ms: 75, dead_time_ms: 8}")
+    assert main([*check, f"flight.trajectory={tmp_path}/square.csv"]) == 2
+    assert "°/s of roll and pitch" in (told := capsys.readouterr().err)
+    assert "smooth it more instead: name it in a YAML file with csv.cutoff_hz: 1 (" in told
+    assert main([*check, f"flight.trajectory={tmp_path}/smooth.yaml"]) == 0
+    capsys.readouterr()
+    slow_down = ["--set", "flight.slow_down=true"]
+    assert main([*check, f"flight.trajectory={tmp_path}/square.csv", *slow_down]) == 0
+    told = capsys.readouterr().out
+    assert "square: if the table's speed jumps, as at a corner, smooth it more instead: " in told
+    assert "(-0.0 m" not in told
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("max_tilt_deg=20", "name the section, as in `limits.max_tilt_deg`"),
         ("steepness=20", "write SECTION.KEY=VALUE"),
         ("limits.max_tilt_deg", "write SECTION.KEY=VALUE"),
-        ("limit.max_tilt_deg=20", "there is no section `limit`"),
+        ("limit.max_tilt_deg=20", "there is no section `limit`; did you mean limits?"),
         ("mock.wind.speed_m_s=5", "section `mock`, because the mock vehicle reads it from the"),
         ("limits.max_tild_deg=20", "did you mean `max_tilt_deg`?"),
         ("limits.max_tilt_deg=[", "not valid YAML"),

@@ -70,6 +70,7 @@ def told(tmp_path, text):
         ("link: {target_system: 1.5}", "`link.target_system` must be a whole number (got 1.5)"),
         ("link: {endpoint: 5}", "`link.endpoint` must be a text (got 5)"),
         ("vehicle: {identified: ''}", "`vehicle.identified` must not be empty (got '')"),
+        ("safety: {fence_polygon_m: [[0, 0], [5, 0]]}", "fence_polygon_m must have at least three"),
         ("safety: {fence_polygon_m: [5]}", "`safety.fence_polygon_m.0` is a list: write `[5]`"),
         ("safety: {fence_polygon_m: {a: 5}}", "_polygon_m` must be a list (got a section)"),
         ("limits.max_tilt_deg: 20", "contains a dot; write `limits: {max_tilt_deg: 20}`"),

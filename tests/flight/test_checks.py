@@ -19,9 +19,11 @@ def test_what_is_unsafe_is_refused_before_arming_or_accepted_by_name():
     assert refused.result.endswith("set COM_OF_LOSS_T to 0.75")
     assert "unsafe, but accepted by flight.accept: " + refused.result in told["accepted"]
     assert (
-        "preflight warnings: COM_LOW_BAT_ACT, planner.name; see `companion doctor`"
-        in told["accepted"]
+        "preflight warnings: COM_LOW_BAT_ACT, planner.name; `companion doctor` says what to set, "
+        "docs/troubleshooting.md explains each" in told["accepted"]
     )
+    # The checks before arming make some of these findings again.
+    assert sum(text.startswith("preflight warnings: ") for text in told["accepted"]) == 1
 
 
 def flown_with_a_gap(autopilot, fault, after):

@@ -55,6 +55,7 @@ def test_a_landing_in_which_the_vehicle_crashed_is_not_called_good():
     assert mock.state()["crashed"]
     assert summary.result.startswith("the vehicle lies tilted by "), summary.events
     assert summary.result.endswith("after the landing: it tipped over or crashed")
+    assert summary.as_dict()["at_the_end"]["tilt_deg"] > 45.0
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])

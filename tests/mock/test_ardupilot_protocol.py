@@ -44,6 +44,8 @@ def test_its_version_by_either_command(rig):
     assert first.flight_sw_version >> 16 == second.flight_sw_version >> 16 == 0x0407
     assert first.capabilities == 64495
     assert bytes(first.flight_custom_version) == b"12f6aa4e"
+    assert (first.uid, len(first.uid2), first.board_version) == (0, 18, 0)
+    assert any(first.uid2), "its own hardware id: what PX4's mock learned is of another vehicle"
 
 
 @pytest.mark.parametrize(

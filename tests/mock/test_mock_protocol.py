@@ -94,6 +94,8 @@ def test_request_message():
     assert rig.command(512, 148) == ACCEPTED
     version = rig.messages("AUTOPILOT_VERSION")[-1]
     assert version.capabilities == 0xE8FF
+    assert version.uid.to_bytes(8) == b"ITALDINO"
+    assert not any(version.uid2)
     assert rig.command(512, dialect.MAVLINK_MSG_ID_HOME_POSITION) == ACCEPTED
     assert rig.messages("HOME_POSITION")[-1].latitude == 473977433
     assert rig.command(512, 300) == ACCEPTED

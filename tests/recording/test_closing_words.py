@@ -252,7 +252,7 @@ def test_a_flight_that_ended_early_says_when_why_and_what_to_do():
     assert told.next_command == "companion plot flights/one"
 
 
-@pytest.mark.parametrize("monitor", ["deadlines", "starvation"])
+@pytest.mark.parametrize("monitor", ["deadlines", "starvation", "answer gaps", "answer rate"])
 def test_a_demo_that_the_computer_was_too_slow_for_is_flown_in_lockstep_next(monitor):
     """On a busy computer the first `make demo` failed, and the words led to realtime.scheduler."""
     demo = Invocation(".venv/bin/companion", ["demo", "--maneuvers", "steps"], None)
@@ -276,6 +276,16 @@ def test_a_vehicle_that_is_left_armed_in_the_air_comes_before_all_else():
     _, text = words(armed)
     assert "vehicle now: ARMED, in mode AUTO.LOITER" in text
     assert "what to do: the vehicle is armed: take it over or land it; then: make" in text
+
+
+def test_a_vehicle_that_lies_on_its_side_is_not_told_as_merely_disarmed():
+    """Refused at the takeover in strong wind, a vehicle tipped over in PX4's own landing."""
+    lying, standing = (
+        {**GOOD, **ENDED, "at_the_end": {"armed": False, "mode": "M", "tilt_deg": tilt}}
+        for tilt in (45.3, 20.0)
+    )
+    assert "disarmed, in mode M, tilted by 45°: it tipped over or crashed; pull " in words(lying)[1]
+    assert words(standing)[0].lines[1] == "  vehicle now: disarmed, in mode M"
 
 
 def test_a_vehicle_that_fell_silent_is_not_told_as_it_is_now():

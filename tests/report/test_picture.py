@@ -114,6 +114,21 @@ def test_each_panel_has_its_curve_its_unit_and_all_marks():
         pyplot.close(figure)
 
 
+def test_a_panel_without_a_value_says_so_instead_of_an_axis_of_negative_errors():
+    """A flight that ended before the takeover has no tracking error."""
+    from matplotlib import pyplot  # noqa: PLC0415
+
+    unknown = {"error": Curve(TIME, np.full((100, 1), nan))}
+    for curves in ({**FLIGHT.curves, **unknown}, {"motion": FLIGHT.curves["motion"]}):
+        figure, panels = pyplot.subplots(len(PANEL_HEIGHTS), 1)
+        try:
+            draw_history(panels, replace(FLIGHT, curves=curves))
+            assert "not measured" in [text.get_text() for text in panels[0].texts]
+            assert [len(axes.get_yticks()) > 0 for axes in panels] == [False, True, True, True]
+        finally:
+            pyplot.close(figure)
+
+
 def test_a_damaged_record_is_drawn_and_its_fault_told(tmp_path, capsys):
     record(tmp_path, motion=True, summary=WHOLE)
     path = tmp_path / "flight.mcap"

@@ -120,7 +120,7 @@ async def silent(scene):
     """sends no more"""
     await stream(1.5, lambda _: scene.local(VELOCITY, velocity=(1.5, 0.0, 0.0)))
     state = await scene.is_handed_back()
-    scene.is_said("is silent, and the vehicle is held")
+    scene.is_said("it sends no valid setpoint, and the vehicle is held")
     scene.is_said("has ended")
     return state
 

@@ -198,7 +198,7 @@ def test_a_client_that_goes_on_for_a_silent_one_is_named():
         await asyncio.sleep(0.7)
         await stream(0.3, lambda _: second.local(ALL, home))
         assert ground.texts()[-2:] == [
-            "first (245/190): the owner is silent, and the vehicle is held",
+            "first (245/190): it sends no valid setpoint, and the vehicle is held",
             "second (246/190) is in control",
         ]
         await asyncio.sleep(2.5)

@@ -182,6 +182,9 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
     assert ", because of limits.max_tilt_rate_deg_s at" in notes[0]  # without the reserve
     assert f"instead of {ANGULAR.duration:.1f} s, and its highest speed is" in notes[1]
     assert f"{found.trajectory.duration:.1f} s, at most" in overview(found.trajectory)
+    for part_count, more in ((5, "; and in 1 more part"), (6, "; and in 2 more parts")):
+        parts = found.parts[:1] * part_count
+        assert slow_down_notes(ANGULAR, found._replace(parts=parts), 0.5)[0].endswith(more)
     as_fast = slow_down_notes(ANGULAR, found._replace(trajectory=ANGULAR), 0.5)[1]
     assert "and its highest speed is still" in as_fast
 

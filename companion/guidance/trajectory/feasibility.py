@@ -19,6 +19,8 @@ _TO_DEGREES = 180.0 / pi
 
 TILT_LIMIT = "limits.max_tilt_deg"
 """Configuration key of the tilt limit."""
+TILT_RATE_LIMIT = "limits.max_tilt_rate_deg_s"
+"""Configuration key of the limit of the roll-pitch rate."""
 SLOWER_REMEDY = (
     "fly it more slowly (--slow-down, or flight.slow_down: true, finds how much), or change the "
     "limit"
@@ -183,7 +185,7 @@ def _limited_quantities(motion: Motion, envelope: Envelope) -> Iterator[_Limited
     speed = np.linalg.norm(motion.velocity, axis=1)
     yield _LimitedQuantity(TILT_LIMIT, limits.max_tilt, demanded.tilt, "° of tilt", _TO_DEGREES)
     yield _LimitedQuantity(
-        "limits.max_tilt_rate_deg_s",
+        TILT_RATE_LIMIT,
         limits.max_tilt_rate,
         demanded.tilt_rate,
         "°/s of roll and pitch",

@@ -58,6 +58,8 @@ class FlightFacts:
     silence: float | None = None
     """Time since the vehicle was last heard, s; `armed` and `mode` may have changed since. None: it
     was heard to the end."""
+    tilt: float | None = None
+    """Tilt of the vehicle at the end, rad; None: unknown."""
     battery: tuple[float | None, float | None] = (None, None)
     """Remaining charge, 0..1, at take-off and at the end; None: unknown."""
     min_battery: float = 0.0
@@ -96,6 +98,7 @@ class FlightFacts:
                 "armed": self.armed,
                 "mode": self.mode,
                 "unheard_s": _rounded(self.silence),
+                "tilt_deg": _in_degrees(self.tilt),
             },
             "battery": {
                 "takeoff": charge_at_takeoff,
@@ -104,7 +107,7 @@ class FlightFacts:
             },
             "advice": list(self.advice),
             "gain_warning": self.gain_warning,
-            "max_tilt_deg": None if self.max_tilt is None else _rounded(degrees(self.max_tilt)),
+            "max_tilt_deg": _in_degrees(self.max_tilt),
             "settings": self.settings,
             "drag_learned": self.drag_learned,
             "changes": list(self.changes),
@@ -113,3 +116,7 @@ class FlightFacts:
 
 def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 3)
+
+
+def _in_degrees(angle: float | None) -> float | None:
+    return None if angle is None else round(degrees(angle), 3)
