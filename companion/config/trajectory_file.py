@@ -1,13 +1,12 @@
 """Trajectories as files: one shape in YAML, or a CSV table of samples."""
 
-from math import tau
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from companion.config.file_kinds import FileKind, require_kind
+from companion.config.trajectory_notes import detour_notes, table_notes
 from companion.config.trajectory_shapes import (
     Acceleration,
     CircleShape,
@@ -23,27 +22,12 @@ from companion.guidance.trajectory import (
     Frame,
     HeadingFrom,
     SampleOptions,
-    Table,
     Trajectory,
     TrajectoryError,
     from_samples,
     read_csv,
     reporting_numerical_errors,
 )
-from companion.guidance.trajectory.septic_spline import Floats
-from companion.guidance.trajectory.spline_curve import SplineCurve
-from companion.guidance.trajectory.timed_curve import TimedCurve
-from companion.guidance.trajectory.waypoints import largest_detour
-
-_MOST_COLUMNS_SHOWN = 10
-_SMALLEST_REPORTED_DETOUR = 0.05
-"""Smallest distance of a curve from the lines between its points that a note reports, m."""
-_SHORTEST_RAMP = 0.05
-"""Shortest extra duration by ramps that a note reports, s."""
-_LARGEST_YAW_RANGE = 13.0
-"""Largest range of yaw without a note, rad: a little over two turns; more may be degrees."""
-_MOST_ROWS_COMPARED = 2000
-"""Tables with more rows are not compared with the path, because their rows are dense."""
 
 
 class CsvShape(Section):
@@ -85,7 +69,7 @@ class CsvShape(Section):
             trajectory = from_samples(table, options, self.file.stem)
         except TrajectoryError as error:
             raise TrajectoryError(f"{path}: {error}") from error
-        return LoadedTrajectory(trajectory, _table_notes(path, frame, table, trajectory))
+        return LoadedTrajectory(trajectory, table_notes(path, frame, table, trajectory))
 
     def _frame(self, table_frame: str | None, path: Path) -> Frame | None:
         """The frame that this section or the table names; None if neither does."""
@@ -110,64 +94,6 @@ class LoadedTrajectory(NamedTuple):
     notes: tuple[str, ...] = ()
     """How a table was read, or how far a curve leaves the lines between its waypoints; one sentence
     each."""
-
-
-_AXES = {
-    Frame.ENU: "x east, y north, z up (enu)",
-    Frame.NWU: "x north, y west, z up (nwu)",
-    Frame.NED: "x north, y east, z down (ned)",
-}
-
-
-def _table_notes(
-    path: Path, frame: Frame | None, table: Table, trajectory: TimedCurve
-) -> tuple[str, ...]:
-    """Notes on a table: its frame, its unused columns, and ramps that were added."""
-    axes_note = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
-    if frame is None:
-        axes_note += (
-            ", because it names no frame; to name one, write `# frame: ned` in the table's first "
-            "line, or set csv.frame in the YAML file that names the table"
-        )
-    notes = [axes_note]
-    if table.unused_columns:
-        column_names = ", ".join(table.unused_columns[:_MOST_COLUMNS_SHOWN])
-        notes.append(f"{path.name}: these columns are not used: {column_names}")
-    if table.yaw is not None and (yaw_range := float(np.ptp(table.yaw))) > _LARGEST_YAW_RANGE:
-        notes.append(
-            f"{path.name}: its yaw turns by {yaw_range:.4g} rad, {yaw_range / tau:.1f} turns; if "
-            "the column is in degrees, convert it to rad"
-        )
-    table_duration = float(table.times[-1])
-    if trajectory.duration > table_duration + _SHORTEST_RAMP:
-        notes.append(
-            f"{path.name} begins or ends in motion: ramps from and to rest make it last "
-            f"{trajectory.duration:.1f} s instead of {table_duration:.1f} s"
-        )
-    if table.times.size <= _MOST_ROWS_COMPARED:
-        notes += _detour_notes(trajectory, table.times, "give more rows")
-    return tuple(notes)
-
-
-def _detour_notes(
-    trajectory: Trajectory, times: Floats | None = None, remedy: str = "set waypoints.stops: true"
-) -> tuple[str, ...]:
-    """A note on how far a curve leaves the straight lines between its points; may be empty.
-
-    Args:
-        trajectory: the trajectory; only a spline has a note.
-        times: (k,), times of the points on the spline, s; None: its knots.
-        remedy: what to do to fly along the lines.
-    """
-    if not (isinstance(trajectory, TimedCurve) and isinstance(trajectory.curve, SplineCurve)):
-        return ()
-    detour = largest_detour(trajectory.curve.spline, times)
-    if detour < _SMALLEST_REPORTED_DETOUR:
-        return ()
-    return (
-        f"{trajectory.name}: the curve leaves the straight lines between its points by up to "
-        f"{detour:.1f} m; to fly along the lines, {remedy}",
-    )
 
 
 class TrajectoryFile(Section):
@@ -198,7 +124,7 @@ class TrajectoryFile(Section):
             return self.csv.read(folder)
         (name,) = self.model_fields_set
         trajectory: Trajectory = getattr(self, name).trajectory()
-        return LoadedTrajectory(trajectory, _detour_notes(trajectory))
+        return LoadedTrajectory(trajectory, detour_notes(trajectory))
 
 
 def is_table(path: Path) -> bool:

@@ -44,7 +44,10 @@ def events_at_end(flight: FlightData) -> list[Table]:
     nearby_events = [
         each for each in flight.events if abs(each.time - flight.early_end.time) <= _END_WINDOW
     ]
-    rows = [(f"{each.time:.1f}", each.source, each.text) for each in nearby_events[:_MAX_EVENTS]]
+    rows = [
+        (f"{each.time:.1f}", each.source, each.text.removeprefix(f"{each.source}: "))
+        for each in nearby_events[:_MAX_EVENTS]
+    ]
     title = f"Events within {_END_WINDOW:.0f} s of the end"
     return [Table(title, ("time, s", "from", "what happened"), rows)] if rows else []
 

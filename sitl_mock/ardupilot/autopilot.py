@@ -55,7 +55,7 @@ class ArduPilot:
         middleware_sw_version=0,
         os_sw_version=0,
         flight_custom_version=tuple(b"12f6aa4e"),
-        uid2=tuple(b"3d1219c7c4c5404aa\0"),  # ArduPilot's simulator tells its computer's id there
+        uid2=tuple(b"0123456789abcdef0\0"),  # as ArduPilot's simulator, whose `uid` is 0
     )
 
     def slot_period_us(self, settings: VehicleSettings) -> int:

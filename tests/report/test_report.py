@@ -153,6 +153,7 @@ def test_a_failed_flight_shows_where_it_ended_and_the_limit_it_crossed(failed):
     events = text.index("Events within 5 s of the end")
     assert text.index("<h1") < events < text.index("Tracking by maneuver")
     assert told["result"] in text[events : text.index("Tracking by maneuver")]
+    assert "autopilot: " not in text[events : text.index("Tracking by maneuver")]
 
 
 def test_the_track_in_space_fits_its_picture_also_where_the_vehicle_only_climbs(folder):

@@ -133,6 +133,13 @@ def test_a_yaw_of_many_turns_is_told_and_one_of_two_is_not(tmp_path):
         assert bool(notes) == told
 
 
+def test_latitude_and_longitude_are_told_and_a_path_of_a_metre_is_not(tmp_path):
+    for size, told in ((3e-4, True), (1.0, False), (0.0, False)):
+        lines = [f"{0.1 * k},{47.39 + size * k / 49},8.54,10" for k in range(50)]
+        loaded = read_trajectory(csv_of(tmp_path, lines, "t,x,y,z"))
+        assert any("moves by only 0.3 mm" in note for note in loaded.notes) == told
+
+
 def test_a_column_that_is_named_twice_is_refused():
     lines = ["t,x,y,z,x_m", *(f"{row},0" for row in rows())]
     with pytest.raises(TrajectoryError, match="names the column x more than once"):
