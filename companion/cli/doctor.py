@@ -119,7 +119,10 @@ class _DoctorRun:
         """
         config = self._config
         async with open_session(config, self._make_link) as vehicle:
-            self.say(f"Asking the vehicle on {config.link.endpoint} …")
+            timeout = config.flight.connect_timeout_s
+            self.say(
+                f"Waiting for the vehicle on {config.link.endpoint}, for at most {timeout:g} s …"
+            )
             findings = await vehicle.wait_for_vehicle()
             if findings:
                 return self._report(findings)
