@@ -3,16 +3,12 @@
 import asyncio
 from collections.abc import Callable
 from contextvars import Context
-from math import inf
 from typing import Protocol, TypeVarTuple
 
 from companion.mavlink.lockstep import LockstepEventLoop, SettlingSelector
 from companion.mavlink.loop import ReadyKeys
 
 Arguments = TypeVarTuple("Arguments")
-
-_DUE_WITHIN_S = 1e-8
-"""A timer this close is left to the event loop, which runs timers due within 1 ns, s."""
 
 
 class VirtualClock:
@@ -62,24 +58,19 @@ class _VirtualSelector(SettlingSelector):
         self.scheduled_count = 0
         self._clock, self._world = clock, world
 
-    def select(self, timeout: float | None = None) -> ReadyKeys:
-        """Advance the vehicle until a callback is scheduled or a timer is due."""
-        clock, count_before = self._clock, self.scheduled_count
-        time_left = inf if timeout is None else timeout
-        until = clock.now + time_left
-        while True:
-            super().select(time_left)
-            # Most messages only call functions of the program, and schedule nothing: then the next
-            # step follows without an iteration of the event loop, which would take longer.
-            time_left = until - clock.now
-            if self.scheduled_count != count_before or time_left <= _DUE_WITHIN_S:
-                return []
-
     def wait(self, timeout: float | None) -> ReadyKeys:
         if timeout == 0:
             self._world.deliver_due()
         else:
-            self._world.advance(inf if timeout is None else self._clock.now + timeout)
+            until = float("inf") if timeout is None else self._clock.now + timeout
+            count_before = self.scheduled_count
+            # Most messages only call functions of the program, and schedule nothing.
+            while (
+                self.scheduled_count == count_before
+                and not self.is_settling
+                and self._clock.now < until
+            ):
+                self._world.advance(until)
         return []
 
 
