@@ -57,8 +57,8 @@ class SafetyConfig(Section):
     battery_action: Literal["warn", "hand_back", "land"] = "land"
     """Action if the battery is below limits.min_battery_percent, or not reported for 5 s."""
     position_action: Ending = "land"
-    """Action if GPS is lost, if the estimator loses attitude, velocity or position, or if GPS or
-    the estimator's status is not reported for 5 s."""
+    """Action if GPS is lost, if the estimator loses attitude, velocity or position, if its height
+    contradicts its vertical speed, or if GPS or its status is not reported for 5 s."""
     max_reset_m: Annotated[float, Field(ge=0.01, le=20.0)] = 1.0
     """Largest sum of the estimator's position jumps in a flight. The position references move
     with each jump."""

@@ -18,6 +18,7 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "reset": "check GPS and compass: the autopilot's estimate jumped",
     "resets": "check GPS and compass; the limits are safety.max_reset_m, max_reset_deg, max_resets",
     "heading": "check the compass: its calibration, and currents and metal near it",
+    "height": "check the barometer: its foam, and wind or light that reaches it",
     "tilt": "find what tilted the vehicle beyond limits.max_tilt_deg: wind, a collision, a motor; "
     "if it swung more and more, lower planner.gain_per_s, then run `companion identify`",
     "body rate": "check the autopilot's rate loop; the limit is safety.max_body_rate_deg_s",

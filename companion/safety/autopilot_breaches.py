@@ -104,6 +104,18 @@ def heading_drift(limit: float) -> BreachCheck:
     )
 
 
+def height_contradiction(limit: float) -> BreachCheck:
+    """The height changed by more than `limit`, m, in 3 s; the vertical speed does not show it."""
+    return above(
+        limit,
+        lambda snapshot: snapshot.resets.height_contradiction,
+        lambda change: (
+            f"the height changed by {change:.1f} m in 3 s, and the vertical speed shows no such "
+            "motion: the barometer or the estimator is wrong"
+        ),
+    )
+
+
 def too_many_estimator_resets(max_count: int, max_shift: float, max_heading: float) -> BreachCheck:
     """The estimator was reset more than `max_count` times within 30 s, or too far in this flight.
 

@@ -126,6 +126,8 @@ class Resets(NamedTuple):
     """Largest jump of the thrust axis, rad."""
     heading_drift: float = 0.0
     """Gradual change of the heading in 20 s that the body rates do not explain, rad."""
+    height_contradiction: float = 0.0
+    """Change of the height in 3 s that the vertical speed does not explain, m."""
 
 
 class Snapshot(NamedTuple):

@@ -11,6 +11,7 @@ from companion.guidance.reference import Vector, minus
 from companion.safety.counter_window import CounterWindow
 from companion.safety.frozen_telemetry import FrozenTelemetry
 from companion.safety.heading_drift import HeadingDrift
+from companion.safety.height_contradiction import HeightContradiction
 from companion.safety.setpoint_echo import SetpointEcho
 from companion.safety.snapshot import (
     HEARD_TIMEOUT_S,
@@ -54,6 +55,7 @@ class SnapshotBuilder:
         self.counters = CounterWindow(link, loop.record, real_time=real_time)
         self._frozen_telemetry = FrozenTelemetry()
         self._heading_drift = HeadingDrift(loop.resets)
+        self._height_contradiction = HeightContradiction(loop.resets)
         self._frames_heard = 0
         self._heard_at = 0.0
         self.fence_centre_ned: Vector | None = None
@@ -87,6 +89,7 @@ class SnapshotBuilder:
         self.echo.begin(self._link.autopilot)
         self._frozen_telemetry.begin(now)
         self._heading_drift.begin()
+        self._height_contradiction.begin()
 
     def fence_centre_without_resets(self) -> FenceCentre | None:
         """Centre of the fence in the frame without resets; None: no position, or no control yet."""
@@ -197,6 +200,7 @@ class SnapshotBuilder:
             wrap_angle(resets.frame.offset - self._heading_frame_at_start.offset),
             resets.largest_tilt_jump,
             self._heading_drift.drift(now),
+            self._height_contradiction.unexplained_change(self._link.state.position),
         )
 
     def _current_lat_lon(self, now: float) -> LatLon | None:

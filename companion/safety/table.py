@@ -28,6 +28,10 @@ _LARGEST_HEADING_DRIFT = radians(30.0)
 """Largest gradual change of the heading in 20 s that the body rates do not explain, rad. From 45°
 on position control swings, from 60° on it diverges; real autopilots in simulation drift by up to
 2.8°."""
+_LARGEST_HEIGHT_CONTRADICTION = 1.5
+"""Largest change of the height in 3 s that the vertical speed does not explain, m. In 153 flights
+of real autopilots in simulation it was at most 0.35 m. With a barometer that jumped by 6 m it was
+3.6 m: ArduPilot's vehicle sank to the ground at 1 m/s."""
 _ESTIMATE_DELAY = 0.08
 """Delay of the estimated horizontal motion behind the true motion, s. Measured on accelerating
 mock vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
@@ -85,6 +89,7 @@ def _autopilot_monitors(config: Config) -> tuple[Monitor, ...]:
         safety.max_resets, safety.max_reset_m, safety.max_reset_angle
     )
     drift = autopilot_breaches.heading_drift(_LARGEST_HEADING_DRIFT)
+    height = autopilot_breaches.height_contradiction(_LARGEST_HEIGHT_CONTRADICTION)
     battery = autopilot_breaches.battery(config.limits.min_battery)
     position = Action(safety.position_action)
     return (
@@ -100,6 +105,7 @@ def _autopilot_monitors(config: Config) -> tuple[Monitor, ...]:
         Monitor("reset", autopilot_breaches.any_estimator_reset, Action.WARN, raise_after=0.1),
         Monitor("resets", resets, Action(safety.reset_action)),
         Monitor("heading", drift, Action(safety.reset_action)),
+        Monitor("height", height, position, raise_after=0.1),
     )
 
 

@@ -146,6 +146,13 @@ BREACHES = [
     ("resets", FINE._replace(resets=Resets(1, 0.0, -0.8)), LAND, 0.0, "46° of heading"),
     ("resets", FINE._replace(resets=Resets(1, 0.0, 0.0, 0.4)), LAND, 0.0, "23° of tilt"),
     ("heading", FINE._replace(resets=Resets(heading_drift=0.6)), LAND, 0.0, "changed by 34°"),
+    (
+        "height",
+        FINE._replace(resets=Resets(height_contradiction=1.6)),
+        LAND,
+        0.1,
+        "by 1.6 m",
+    ),
     ("tilt", motion(q=roll(57.0)), HAND_BACK, 0.3, TILTED),
     ("body rate", motion(body_rates=(0.0, 0.0, -7.1)), HAND_BACK, 0.2, "407°/s, faster than"),
     ("fence", motion(offset=(50.0, 35.0, 0.0)), LAND, 0.0, "61.0 m from where control began"),
