@@ -142,6 +142,20 @@ def no_gps(vehicle):
         time.sleep(5.0)
 
 
+def wrong_height(vehicle):
+    """The barometer jumps up; the estimate follows without a reset. Only ArduPilot believes it."""
+    name, jump = {"px4": ("SIM_BARO_OFF_P", 0.6), "ardupilot": ("SIM_BARO_GLITCH", 6.0)}[
+        vehicle.autopilot
+    ]  # hPa, m
+    flight = vehicle.hovering(hover={"duration_s": 15.0})
+    event = time.monotonic()
+    vehicle.parameter(name, jump)
+    time.sleep(5.0)
+    vehicle.parameter(name, 0.0)
+    flight.finish()
+    return figures(vehicle, flight, event, 25.0)
+
+
 def out_of_the_fence(vehicle):
     """Blown out by a gust; a planned leaving is refused before take-off."""
     names = {"px4": "SIH_WIND_N", "ardupilot": "SIM_WIND_SPD"}
@@ -218,6 +232,7 @@ ROWS = {
     "battery": battery,
     "pilot": pilot,
     "no_gps": no_gps,
+    "wrong_height": wrong_height,
     "fence": out_of_the_fence,
     "attitude_lowered": attitude_lowered,
     "attitude_kept_low": lambda vehicle: attitude_lowered(vehicle, times=10),
