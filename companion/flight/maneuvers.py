@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import pairwise
+from math import dist
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +19,14 @@ from companion.flight.maneuver_checks import (
     with_reserve,
 )
 from companion.guidance import Corners, Doublets, Maneuver, ManeuverSequence, Steps
-from companion.guidance.follow import Follow, circle, hover
+from companion.guidance.follow import Follow, HeldHeadingManeuver, circle, hover
 from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory, slow_down, violations
 from companion.guidance.trajectory.demand import Motion, sampled_motion
 from companion.guidance.trajectory.feasibility import TILT_LIMIT, TILT_RATE_LIMIT
 
 _MOST_PARTS_SHOWN = 4
+_LARGEST_RETURN_ERROR = 0.5
+"""Largest distance from the beginning to the end of a maneuver that another one follows, m."""
 _SMOOTHER_REMEDY = (
     "if the table's speed jumps, as at a corner, smooth it more instead: name it in a YAML file "
     "with csv.cutoff_hz: 1 (docs/trajectories.md)"
@@ -37,11 +41,27 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
     with the vehicle's own drag as soon as it is known (`maneuver_checks.require_still_flyable`).
 
     Raises:
-        ConfigError: a trajectory cannot be read, or a maneuver cannot be flown within the limits
-            and the fence.
+        ConfigError: a trajectory cannot be read, a maneuver cannot be flown within the limits and
+            the fence, or one that ends elsewhere is not the last.
     """
     drag = drag or drag_before_connecting(config)
-    return ManeuverSequence([_maneuver(config, name, drag) for name in config.flight.maneuvers])
+    maneuvers = [_maneuver(config, name, drag) for name in config.flight.maneuvers]
+    for maneuver, next_maneuver in pairwise(maneuvers):
+        _require_return(maneuver, next_maneuver)
+    return ManeuverSequence(maneuvers)
+
+
+def _require_return(maneuver: Maneuver, next_maneuver: Maneuver) -> None:
+    """Refuse a maneuver that ends elsewhere: the reference would jump back to where it began."""
+    if not isinstance(maneuver, Follow | HeldHeadingManeuver):
+        return
+    trajectory = maneuver.trajectory
+    distance = dist(trajectory.at(0.0).position, trajectory.at(trajectory.duration).position)
+    if distance > _LARGEST_RETURN_ERROR:
+        raise ConfigError(
+            f"flight.maneuvers: {maneuver.name} ends {distance:.1f} m from where it begins, but "
+            f"{next_maneuver.name} begins there again; put {maneuver.name} last, or let it return"
+        )
 
 
 def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:

@@ -118,6 +118,27 @@ def test_what_the_limits_do_not_allow_is_refused_or_slowed_down():
     assert any("is slowed down to keep its limits" in text for _, text in summary.events)
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"circle": {"laps": 1.5}, "flight": {"maneuvers": ["circle", "hover"]}},
+            "ends 6.0 m",
+        ),
+        ({"circle": {"laps": 1.5}, "flight": {"maneuvers": ["hover", "circle"]}}, None),
+        ({"circle": {"laps": 2.0}, "flight": {"maneuvers": ["circle", "steps", "hover"]}}, None),
+    ],
+)
+def test_only_the_last_maneuver_may_end_elsewhere(changes, words):
+    """The next one begins at the old place: the vehicle rushed back, or was landed."""
+    config = parse(yaml.safe_dump(merged({"circle": {"radius_m": 3.0}}, changes)), "test", Config)
+    if words is None:
+        maneuvers.configured_maneuvers(config)
+        return
+    with pytest.raises(ConfigError, match=f"{words} from where it begins, but hover begins there"):
+        maneuvers.configured_maneuvers(config)
+
+
 @pytest.mark.parametrize("heading", [0.0, 2.0, -3.0])
 def test_a_trajectory_along_its_path_begins_with_a_turn_from_the_vehicles_heading(heading):
     eight = gerono_eight(3.0, Laps(2.0, face_path=True))

@@ -145,7 +145,7 @@ def configuration(flight: str, base: list[Path], folder: Path, changes: dict) ->
             config["flight"]["trajectory"] = str(path)
         # Each begins, and is left, in a calm hold.
         maneuvers += [part.maneuvers] if part.maneuvers == "hover" else ["hover", part.maneuvers]
-    if maneuvers[-1] != "hover":
+    if maneuvers[-1] != "hover" and part.trajectory is not _CLIMB:  # which ends elsewhere
         maneuvers.append("hover")
     config = merged(config, {"flight": {"maneuvers": maneuvers}, "hover": {"duration_s": _PAUSE_S}})
     if asked.parts == ["hover"]:
