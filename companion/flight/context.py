@@ -39,8 +39,8 @@ _BACKLOG_DRAIN_TIME = 0.5
 """Time after a stall of this program within which the queued telemetry is read, s."""
 
 _SHORTEST_STALL = 0.2
-"""If stalls of this program during a wait for a heartbeat add up to this time, the heartbeat does
-not count as fresh, s."""
+"""Time for which this program stalled, s, from which telemetry may be queued: a heartbeat awaited
+meanwhile does not count as fresh, and a timeout is extended (`wait_for_first`)."""
 
 _MAX_STALLED_WAITS = 3
 """After this number of waits with a stall, a heartbeat counts as fresh: a computer that always
